@@ -103,14 +103,18 @@ def lead_presses(
         codes, rested, names = list[Codes](), list[Codes](), harness.taxel_names
         nothing: Codes = (None,) * len(names)
 
-        def ready(stage: PressStage) -> bool:
+        def take() -> list[Codes]:
             arrived = sources.take(WAIT_US).arrived
             codes.extend(one.taxels for one in arrived if isinstance(one, SwitchFrame) and one.taxels is not None)
             del codes[:-_MOST_FRAMES]
+            return codes
+
+        def ready(stage: PressStage) -> bool:
+            take()
             newest = (found[-1] if found else nothing for found in (codes, rested))
             return view(stage, names, *newest) or stop.is_set()
 
-        _await(sources, lambda: ready("untouched") or codes, "taxels")
+        _await(sources, take, "taxels")
         while not ready("untouched"):
             pass
         codes.clear()

@@ -184,8 +184,9 @@ class GlovePage:
             raise SettingError(f"{len(self._past)} sensors are watched, numbered from 0")
         now_s, found = monotonic(), list(self._past[asked.trial])
         first = next((at for at, (time_s, _) in enumerate(found) if now_s - time_s < _PAST_S), len(found))
+        # The value of the time before is the first.
         kept = [(round(min(now_s - time_s, _PAST_S), 2), value) for time_s, value in found[max(first - 1, 0) :]]
-        return message("shown", sensor=asked.trial, past=kept, changes=len(found) - first)
+        return message("shown", sensor=asked.trial, past=kept, changes=len(found) - max(first, 1))
 
     def _on_calibrate(self, asked: Asked) -> None:
         """Calibrate the joints, or the pads: the name says which."""

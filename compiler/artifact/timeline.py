@@ -166,7 +166,7 @@ def segment(
     >>> [(one.type, one.start_s, one.end_s) for one in timelines[0].segments()]  # doctest: +SKIP
     """
     if lag_us is not None and not 0 <= lag_us <= _LONGEST_LAG_US:
-        raise SettingError(f"lag_us={lag_us}: the lag must be 0 to {_LONGEST_LAG_US} us")
+        raise SettingError(f"lag_us={lag_us}: the lag must be 0 to {_LONGEST_LAG_US} µs")
     build = Build.load(folder)
     if not isinstance(recordings, GraspSet) and Path(recordings).suffix.lower() == MCAP:
         return _of_run(build, Path(recordings), lag_us, warn)

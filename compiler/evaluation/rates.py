@@ -208,7 +208,7 @@ def placement_words(options: Recipe) -> str:
     words += [f"without {list_names(options.never)}"] if options.never else []
     words += [] if options.apart_mm is None else [f"{options.apart_mm:g} mm apart"]
     words += [] if options.at_most_taxels is None else [f"at most {counted(options.at_most_taxels, 'taxel')}"]
-    words += [] if options.budget_us is None else [f"within {options.budget_us:g} us"]
+    words += [] if options.budget_us is None else [f"within {options.budget_us:g} µs"]
     return ", ".join([*words, *(["robust"] if options.robust else [])])
 
 

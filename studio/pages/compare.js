@@ -1,6 +1,7 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
+import { tag, typeStyles } from "./types.js";
 import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -122,17 +123,18 @@ function show({ builds, hand, both, only, found, said, unused }) {
   ];
   table($("both"), ["", ...builds.map(({ name }, at) => `${"ab"[at]}: ${name}`)], rows.map(([title, text]) => [title, ...builds.map(text)]));
   overlay(hand, { both, a: only[0], b: only[1] }, builds);
-  const types = found.types.map(({ grasp, trials, a, b }) => [grasp, `${trials}`, `${a}`, `${b}`, points((b - a) / trials)]);
+  const styles = typeStyles([...found.types.map(({ grasp }) => grasp), ...found.changed.flatMap(({ a, b }) => [a, b])]);
+  const types = found.types.map(({ grasp, trials, a, b }) => [tag(styles, grasp), `${trials}`, `${a}`, `${b}`, points((b - a) / trials)]);
   table($("types"), ["Type", "Trials", "a right", "b right", "Points"], types);
   say($("changed-heading"), `Trials that changed: ${found.changed.length || "none"}; ${found.better} better, ${found.worse} worse with b`);
   const changed = found.changed.map((trial) => {
     const marked = [trial.a, trial.b].map((read) => {
-      const made = document.createElement("span");
-      made.textContent = read === trial.recorded ? `${read} (right)` : read;
+      const made = tag(styles, read);
+      if (read === trial.recorded) made.append(" (right)");
       made.dataset.is = read === trial.recorded ? "good" : "bad";
       return made;
     });
-    return [linked(trial), trial.recorded, ...marked];
+    return [linked(trial), tag(styles, trial.recorded), ...marked];
   });
   table($("changed"), ["Trial", "True type", "a", "b"], changed);
 }

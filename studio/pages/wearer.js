@@ -1,5 +1,6 @@
 // The page Wearer: a few trials of a person, a build that is adapted to them, and the way back.
 import { openPage } from "./shell.js";
+import { tag, typeStyles } from "./types.js";
 import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -36,9 +37,11 @@ const ask = openPage({
     const [type, count, , after] = result.types[0];
     say($("worst"), `${type}: ${after} of ${count}`);
     list($("warnings"), result.warnings);
+    const styles = typeStyles(result.types.map(([name]) => name));
     const rows = result.types.map(([name, ...counts]) => {
-      const row = document.createElement("tr");
-      row.append(cell("th", name), ...counts.map((one) => cell("td", String(one))));
+      const row = document.createElement("tr"), title = cell("th", "");
+      title.append(tag(styles, name));
+      row.append(title, ...counts.map((one) => cell("td", String(one))));
       return row;
     });
     $("types").replaceChildren(...rows);

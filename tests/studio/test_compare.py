@@ -58,10 +58,14 @@ def compared(browser: Browser, opened: Studio, **how: Any) -> None:
 
 
 def rows(browser: Browser, table: str) -> list[list[str]]:
-    """Return the texts of a table's cells, without its head."""
+    """Return the texts of a table's cells, without its head and without the codes of types."""
     found = browser.script(
-        "return [...document.querySelectorAll(arguments[0])].map((row) => [...row.cells].map((c) => c.textContent))",
-        f"#{table} tbody tr",
+        """return [...document.querySelectorAll(arguments[0])].map((row) => [...row.cells].map((cell) => {
+          const copy = cell.cloneNode(true);
+          for (const chip of copy.querySelectorAll(".chip")) chip.remove();
+          return copy.textContent.trim();
+        }))""",
+        f"#{table} tr:has(td:not(:empty))",
     )
     return [list(row) for row in found]
 

@@ -3,7 +3,7 @@
 import json
 import shlex
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,16 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from thenar.cli import run
-from thenar.compiler import adapt
+from thenar.compiler import adapt, compile_build
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.taxonomy import own
+from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.runtime import Build
 from thenar.studio import Project, Studio
 
 from ..browser import Browser
+from ..sets import grasp_set_of
+from .test_compare import rows
 
 Start = Callable[..., Studio]
 PATIENCE_S = 30
@@ -49,13 +52,6 @@ def adapted(browser: Browser) -> None:
     browser.driver.find_element(By.ID, "adapt").send_keys(Keys.ENTER)
     browser.wait(lambda: browser.text("result-heading"))
     browser.wait(lambda: "adapted from" in browser.text("use"))
-
-
-def rows(browser: Browser) -> list[list[str]]:
-    found = browser.script(
-        "return [...document.querySelectorAll('#types tr')].map((row) => [...row.cells].map((c) => c.textContent))"
-    )
-    return [list(row) for row in found]
 
 
 def told(opened: Studio, request: dict[str, Any], topic: str) -> dict[str, Any]:
@@ -92,12 +88,12 @@ def test_a_build_is_adapted_to_its_wearer_and_back(
     kept = [mine.switch_names.index(switch.name) for switch in build.manifest.switches]
     joints = [mine.joint_names.index(joint.name) for joint in build.manifest.joints]
     read = [build.classify(*one) for one in zip(mine.switches[:, kept], mine.codes[:, joints], strict=True)]
-    by_type = {row[0]: [int(number) for number in row[1:]] for row in rows(browser)}
+    by_type = {row[0]: [int(number) for number in row[1:]] for row in rows(browser, "types")}
     for name in ("cup", "pen", "rod"):
         truth = mine.grasps == name
         assert by_type[name][:2] == [truth.sum(), (truth & (np.array(read) == name)).sum()]
     assert sum(counts[2] for counts in by_type.values()) == made.after
-    worst = rows(browser)[0]
+    worst = rows(browser, "types")[0]
     assert browser.text("worst") == f"{worst[0]}: {worst[3]} of {worst[1]}"
     assert int(worst[3]) / int(worst[1]) == min(after / count for count, _, after in by_type.values())
     assert browser.script("return document.activeElement.id") == "result-heading"
@@ -220,3 +216,98 @@ def test_another_persons_trials_are_not_adapted_to(studio: Start, folder: Path) 
     others = next(one.id for one in opened.project.members("set") if one.name == "D.grasps")
     assert "is no recording of C" in told(opened, {"do": "adapt", "ids": [others]}, "work")["why"]
     assert opened.project.state.build == "more"
+
+
+# With an emulated glove.
+
+TYPES, SWITCHES = ("cup", "pen", "rod"), ("s1", "s2", "s3", "s4")
+CLOSED = {"cup": ("s1",), "pen": ("s2",), "rod": ("s1", "s2", "s3"), "vase": ("s4",)}
+
+
+@pytest.fixture
+def board() -> Iterator[BoardSender]:
+    with LineServer() as line, BoardSender(line.send, SWITCHES, (), 200) as board:
+        board.port = line.port  # type: ignore[attr-defined]
+        yield board
+
+
+@pytest.fixture
+def worn(tmp_path: Path, board: Any, hand: Any) -> Path:
+    """Return a project with a glove, and a build of people who close a switch more than the wearer for a rod."""
+    folder = tmp_path / "recorded"
+    folder.mkdir()
+    labels = np.arange(60) % 3
+    closed = np.array([[name in CLOSED[grasp] for name in SWITCHES] for grasp in TYPES])[labels]
+    closed[:, 3] = labels == 2
+    closed ^= np.random.default_rng(3).random(closed.shape) < 0.1
+    people = np.repeat(["P", "Q"], 30)
+    crowd = grasp_set_of(TYPES, labels, switches=closed, switch_names=SWITCHES, subjects=people)
+    compile_build(crowd, folder / "build", trainer="linear", folds=0, jobs=1)
+    stream = f'port = "{board.port}"\nrate_hz = 200\nswitches = {json.dumps(SWITCHES)}\n'
+    (folder / "glove.toml").write_text(f'name = "bench"\n[[stream]]\n{stream}')
+    Project(folder, hand).remember(build="build")
+    return folder
+
+
+def record(browser: Browser, board: BoardSender, *, until: int, new: str = "") -> None:
+    """Record on the page Wearer, and on the page Record that it leads to, until so many trials are done, or all."""
+    browser.wait(lambda: browser.text("record-command"))
+    browser.driver.find_element(By.ID, "type").send_keys(new, Keys.ENTER)
+    browser.wait(lambda: browser.script("return location.pathname") == "/record.html")
+    key = "#keys [data-key=accept]"
+    browser.wait(lambda: browser.texts(key))
+    browser.driver.find_element(By.CSS_SELECTOR, key).send_keys(Keys.ENTER)
+    while True:
+        browser.wait(lambda: "; " in browser.text("place"))
+        number, total = (int(word) for word in browser.text("place").split(";")[0].split(" of "))
+        held = CLOSED[browser.text("prompt")]
+        board.show({name: float(name in held) for name in SWITCHES})
+        browser.wait(lambda: "captured: " in browser.text("standing"))
+        # A machine that is busy may not read the glove in time.
+        while browser.text("standing").startswith("not captured"):
+            browser.driver.find_element(By.CSS_SELECTOR, key).send_keys(Keys.ENTER)
+            browser.wait(lambda: browser.text("standing").startswith("captured: "))
+        browser.driver.find_element(By.CSS_SELECTOR, key).send_keys(Keys.ENTER)
+        if number == min(until, total):
+            break
+        browser.wait(lambda number=number: browser.text("place").startswith(f"{number + 1} of"))  # type: ignore[misc]
+    if until < total:
+        browser.wait(lambda: browser.text("place").startswith(f"{until + 1} of"))
+        browser.driver.find_element(By.TAG_NAME, "body").send_keys("q")
+    else:
+        browser.wait(lambda: browser.text("prompt") == "no trial is left")
+        browser.driver.find_element(By.CSS_SELECTOR, key).send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.script("return location.pathname") == "/wearer.html")
+
+
+def test_two_minutes_adapt_a_build_and_what_was_left_goes_on(
+    browser: Browser, studio: Start, worn: Path, board: BoardSender
+) -> None:
+    browser.open(f"{studio(None).server.url}wearer.html")
+    record(browser, board, until=2)
+    browser.wait(lambda: browser.texts("#sets label") == ["me.grasps: 2 trials of 2 frames"])
+    record(browser, board, until=6)
+    browser.wait(lambda: browser.text("result-heading") == "Adapted: me, from 6 trials")
+    mine = GraspSet.load(worn / "me.grasps")
+    assert sorted(mine.grasps.tolist()) == sorted(2 * TYPES)
+    build = Build.load(worn / "me")
+    assert build.manifest.adapted is not None
+    assert build.manifest.adapted.counts == (2, 2, 2)
+    browser.wait(lambda: browser.text("build-state").startswith("build: me "))
+    assert not list(worn.glob("me-2*"))
+
+
+@pytest.mark.slow
+def test_a_new_type_is_recorded_and_taught(browser: Browser, studio: Start, worn: Path, board: BoardSender) -> None:
+    browser.open(f"{studio(None).server.url}wearer.html")
+    record(browser, board, until=99, new="vase")
+    browser.wait(lambda: browser.text("result-heading") == "Adapted: me, from 12 trials")
+    build = Build.load(worn / "me")
+    assert build.grasps == (*TYPES, "vase")
+    assert build.classify([name == "s4" for name in SWITCHES][: len(build.manifest.switches)], []) in build.grasps
+    browser.wait(lambda: "me: adapted from build" in browser.text("use"))
+
+
+def test_a_type_that_the_build_knows_is_no_new_one(studio: Start, worn: Path) -> None:
+    assert "cup" in told(studio(None), {"do": "wear", "name": "cup"}, "refused")["why"]
+    assert not list(worn.glob("*.mcap"))

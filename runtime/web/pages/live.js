@@ -3,7 +3,6 @@ import { Replay } from "./replay.js";
 import { openPage } from "./shell.js";
 import { Timeline } from "./timeline.js";
 import { View } from "./view.js";
-import { say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 // In the studio the address names a recording, and the builds to compare on it.
@@ -38,7 +37,7 @@ const ask = openPage({
 });
 
 function begin(about, live = true) {
-  if (live && build !== null && build !== about.name) say($("news"), `The run goes on with ${about.name}, before it was ${build}.`);
+  if (live && build !== null && build !== about.name) view.tell(`The run goes on with ${about.name}, before it was ${build}.`);
   build = about.name;
   timeline.types(about.grasps);
   view.build(about, live);

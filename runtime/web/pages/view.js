@@ -85,6 +85,13 @@ export class View {
     this.#wrong();
   }
 
+  /** Tell news, also to screen readers. */
+  tell(words) {
+    say($("news"), words);
+    Object.assign(this.said, { text: words, at: performance.now() });
+    say($("spoken"), words);
+  }
+
   #aged(old) {
     this.shown = null; // everything is drawn again
     this.#later();
