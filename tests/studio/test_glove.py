@@ -105,7 +105,7 @@ def test_a_stuck_a_silent_and_a_lost_sensor_are_told_apart(
     assert browser.axe() == []
     line.close()
     browser.wait(lambda: {*states(browser).values()} == {"lost"})
-    assert "check its cable" in browser.text("problem")
+    browser.wait(lambda: "check its cable" in browser.text("problem"))
     assert browser.script("return document.getElementById('glove-state').dataset.is") == "bad"
     assert browser.axe() == []
 
