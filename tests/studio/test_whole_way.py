@@ -92,6 +92,7 @@ def record(browser: Browser, board: BoardSender, trials: int, lean: int) -> None
         board.show(held | {"flex": held["flex"] + lean + 3 * number})
         while not captured(browser):  # a busy machine lost rows: do it again, as the page says
             browser.driver.find_element(By.CSS_SELECTOR, key).click()
+            browser.wait(lambda: "captured" not in browser.text("standing"))
         browser.driver.find_element(By.CSS_SELECTOR, key).click()
     browser.wait(lambda: browser.text("prompt") == "no trial is left")
     browser.driver.find_element(By.CSS_SELECTOR, key).click()
