@@ -9,9 +9,10 @@ import shutil
 import sys
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import IO, NamedTuple, Self
+from typing import IO, NamedTuple
 from unicodedata import combining, east_asian_width
 
+from thenar.drivers.closing import Closing
 from thenar.drivers.names import shown
 
 _STYLES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33", "cyan": "36"}
@@ -186,16 +187,14 @@ class Console:
             self.file.flush()
 
 
-class Live:
+class Live(Closing):
     """A view on a terminal that is drawn in place, and gone at the end; elsewhere it does nothing."""
 
     def __init__(self, console: Console) -> None:
         self._console, self._back = console, ""
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """End the view."""
         if self._back:
             self._console.write(f"{self._back}\x1b[?25h")
             self._back = ""

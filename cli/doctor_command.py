@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from thenar.runtime.names import of_device
+
 from .parameters import Number, OutputFile, check_devices, existing_file, existing_folder, overwrite_flag
-from .printing import echo, err, json_flag, of_device, out, progress, show, table
+from .printing import echo, err, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -138,7 +140,7 @@ def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[CheckRe
 
 
 def _print(found: "Sequence[CheckResult]") -> None:
-    numbers = ("predicted us", "measured us")
+    numbers = ("predicted µs", "measured µs")
     devices = table(("device", "part", "there", *numbers), numbers, "Devices")
     for one in found:
         measured = "" if one.measured_us is None else f"{one.measured_us:.0f}"

@@ -139,9 +139,3 @@ def progress(what: str, *, lines: bool = False) -> Iterator[Callable[[int, int],
     with Live(console) as live:
         live.update(f"{what} ...")
         yield report
-
-
-def of_device(name: str, state: str) -> str:
-    """Return `state` as a sentence about the device `name`, naming its port only once."""
-    kind, _, port = name.partition(" at ")
-    return f"{kind if port and port in state else name}: {state}"

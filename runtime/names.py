@@ -12,6 +12,7 @@ __all__ = [
     "level_name",
     "list_names",
     "nearest",
+    "of_device",
     "printable",
     "shortened",
     "sound_name",
@@ -22,6 +23,12 @@ SHOWN = 5
 _CODE_DIGITS = 5
 # At most this many names are compared with an unknown one.
 MOST_COMPARED = 1000
+
+
+def of_device(name: str, state: str) -> str:
+    """Return `state` as a sentence about the device `name`, naming its port only once."""
+    kind, _, port = name.partition(" at ")
+    return f"{kind if port and port in state else name}: {state}"
 
 
 def nearest(name: str, names: Sequence[str]) -> str:

@@ -1,19 +1,23 @@
 """Pages of a project, from its first trial to a recogniser; they train, so they need the compiler.
 
-`open_studio` serves them. The live page and the server are in runtime/web.
+`open_studio` serves them. The live page and the server are in runtime/web. A collection is led without the compiler:
+every name is imported on first use.
 """
 
-from .choose import ChoosePage
-from .errors import ErrorsPage
-from .project import Project
-from .studio import Studio
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .opening import open_studio
+    from .project import Project
+    from .studio import Studio
+
+_HOMES = {"Project": ".project", "Studio": ".studio", "open_studio": ".opening"}
 
 __all__ = ["Project", "Studio", "open_studio"]
 
 
-def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1) -> Studio:
-    """Return the open studio of a project: see `Studio`."""
-    studio = Studio(project, address, token=token, jobs=jobs)
-    ErrorsPage(studio, ChoosePage(studio))
-    studio.changed()
-    return studio
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name], __name__), name)

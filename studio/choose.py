@@ -17,7 +17,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
 from thenar.compiler.glove.propose import propose_harness
-from thenar.compiler.hand import HandShape, grid_places, moved_by, places_of, shape_of, unknown_shape
+from thenar.compiler.hand import HandShape, moved_by
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.elements import elements_of, names_of
 from thenar.compiler.recordings.edits import TrialId
@@ -32,6 +32,7 @@ from thenar.runtime.scanning.timing import scan_us
 from thenar.runtime.web.server import message
 
 from .quick import QuickAccuracy
+from .sensors import placed
 from .studio import Asked, Handler, Report, Studio
 
 _BUILD = "build"
@@ -144,15 +145,8 @@ class ChoosePage:
         """Return the commands that compile a build of these sensors."""
         if not names:
             return ""
-        folder, edits = self._project.folder, self._project.edits
-        sets = [folder / name for name in self._files]
-        recordings, have, first = quote(str(sets[0])), quote(",".join(names)), ""
-        more = "".join(f" {quote(option)}" for option in self._project.options())
-        if len(sets) > 1 or edits.exists():
-            merged = [*sets, "--edits", edits] if edits.exists() else sets
-            # Beside the project, of which it would be one more set.
-            recordings = quote(str(folder.resolve().parent / f"{self._project.name}.grasps"))
-            first = f"thenar merge {' '.join(quote(str(one)) for one in merged)} -o {recordings} && "
+        first, recordings = self._project.joined([self._project.folder / name for name in self._files])
+        have, more = quote(",".join(names)), "".join(f" {quote(option)}" for option in self._project.options())
         output = quote(str(self._project.new_path(_BUILD)))
         return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
 
@@ -229,9 +223,6 @@ def _names(trials: Sequence[TrialId]) -> list[str]:
 
 def drawn(grasp_set: GraspSet, hand: HandShape | None) -> HandDrawing:
     """Return a drawing in which every switch and pad of a set is one to click on: its number is the sensor's."""
-    names = grasp_set.element_names
-    known = hand if hand is not None and names and hand.knows(names) else None
-    places = grid_places(names) if known is None else places_of(known, names)
+    places, fields = placed(grasp_set.element_names, hand)
     switches = tuple(DrawnSwitch(name, x, y, number) for number, (name, (x, y)) in enumerate(places.items()))
-    shown = unknown_shape("the positions of the sensors are unknown") if known is None else shape_of(known)
-    return HandDrawing(**shown, switches=switches, taxels=(), joints=())
+    return HandDrawing(**fields, switches=switches, taxels=(), joints=())

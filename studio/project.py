@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import join, quote
 
 import msgspec
 
@@ -35,11 +36,12 @@ class Member(msgspec.Struct, frozen=True):
 
 
 class State(msgspec.Struct, forbid_unknown_fields=True):
-    """What is remembered in studio.json: the name of the build in use, of the wearer, and of the sets left aside; and
-    the seconds that each kind of work last took.
+    """What is remembered in studio.json: the name of the build in use, of the one that it was adapted in place of, of
+    the wearer, and of the sets left aside; and the seconds that each kind of work last took.
     """
 
     build: str = ""
+    former: str = ""
     wearer: str = "me"
     aside: tuple[str, ...] = ()
     took: dict[str, float] = {}
@@ -103,14 +105,14 @@ class Project:
         """Return the recordings: all sets in use as one, with their edits. Raises ThenarError if there is none."""
         return self.recordings()[0]
 
-    def recordings(self) -> tuple[GraspSet, list[TrialId], list[str]]:
-        """Return the recordings, for each of their rows the trial as it was recorded, and a sentence on each set that
-        does not fit and on each edit that is not used.
+    def recordings(self, paths: Sequence[Path] = ()) -> tuple[GraspSet, list[TrialId], list[str]]:
+        """Return the recordings, these sets or all in use, for each of their rows the trial as it was recorded, and a
+        sentence on each set that does not fit and on each edit that is not used.
 
         Raises ThenarError if there is no set, or the log of edits is damaged before its last line.
         """
         loaded, unused = dict[str, GraspSet](), list[str]()
-        for path in self.sets():
+        for path in paths or self.sets():
             try:
                 loaded[path.name] = GraspSet.load(path)
             except ThenarError as reason:
@@ -130,6 +132,17 @@ class Project:
     def edits(self) -> Path:
         """The path of the log of edits, which may not be there."""
         return self.folder / "edits.jsonl"
+
+    def joined(self, paths: Sequence[Path]) -> tuple[str, str]:
+        """Return the beginning of a command that makes one set of several and of edits, and the name of the result; if
+        there is nothing to do, "" and the name of the only set.
+        """
+        if len(paths) == 1 and not self.edits.exists():
+            return "", quote(str(paths[0]))
+        # Beside the project, of which it would be one more set.
+        whole = str(self.folder.resolve().parent / f"{self.name}.grasps")
+        edits = ["--edits", str(self.edits)] if self.edits.exists() else []
+        return f"{join(['thenar', 'merge', *map(str, paths), *edits, '-o', whole])} && ", quote(whole)
 
     @property
     def harness(self) -> Path:
@@ -160,8 +173,8 @@ class Project:
         path = self.folder / self.state.build
         return (path, Build.load(path)) if self.state.build and (path / "build.json").exists() else None
 
-    def new_path(self, name: str, ending: str = "") -> Path:
-        """Return the path of a new member: its name, with a number if it is taken.
+    def new_path(self, name: str, ending: str = "", *others: str) -> Path:
+        """Return the path of a new member: its name, with a number if a file with one of the endings has it already.
 
         Raises SettingError for a name that a file cannot have.
         """
@@ -170,9 +183,9 @@ class Project:
         if "/" in name or name.startswith("."):
             raise SettingError(f"the name {shortened(repr(name))} is not possible: use letters, digits and spaces")
         for number in range(1, 10_000):
-            path = self.folder / f"{name}{'' if number == 1 else f'-{number}'}{ending}"
-            if not path.exists():
-                return path
+            stem = name if number == 1 else f"{name}-{number}"
+            if not any((self.folder / f"{stem}{end}").exists() for end in (ending, *others)):
+                return self.folder / f"{stem}{ending}"
         raise ThenarError(f"{self.folder} has too many files called {name}")
 
 

@@ -5,7 +5,7 @@ thread if it takes milliseconds. Longer work is queued and done one at a time, b
 "work". The devices of the glove have one user at a time, whose thread the `Station` keeps.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ import msgspec
 
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import ThenarError
+from thenar.runtime.published import DeviceHealth
 from thenar.runtime.web.live import shell_message
 from thenar.runtime.web.server import Message, Server, message
 
@@ -33,7 +34,7 @@ class Asked(msgspec.Struct, frozen=True):
 
     sensors  numbers of sensors        trial, trials  numbers of trials
     id       of a member of the project    name  a name, or a key
-    value    a number
+    value    a number                      ids   of several members
     """
 
     do: str
@@ -43,6 +44,7 @@ class Asked(msgspec.Struct, frozen=True):
     id: str = ""
     name: str = ""
     value: float | None = None
+    ids: tuple[str, ...] = ()
 
 
 Handler = Callable[[Asked], bytes | None]
@@ -55,7 +57,7 @@ class Studio(Closing):
     ----------
     project : Project
         The project.
-    address, token
+    address, token, page
         As for `Server`.
     jobs : int
         Worker processes of a measurement.
@@ -73,14 +75,17 @@ class Studio(Closing):
         As `Server` does.
     """
 
-    def __init__(self, project: Project, address: str, *, token: str | None, jobs: int = -1) -> None:
+    def __init__(
+        self, project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose"
+    ) -> None:
         self.project, self.jobs = project, jobs
         self._requests: dict[str, Handler] = {"cancel": self._cancel}
         self._titles = list[tuple[str, str]]()
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
+        self._stale = False
         self._began_s, self._cancelled = 0.0, False
-        self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
+        self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
 
     def add(
@@ -114,8 +119,15 @@ class Studio(Closing):
         state = self.project.state
         self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
         self._show_members()
+        # Of several changes the last is read: a recording or a build may come while another is read.
+        if not self._stale:
+            self._stale = True
+            self._queue.put(("reading", self._read))
+
+    def _read(self, report: Report) -> None:
+        self._stale = False
         for read in self._readers:
-            self.queue("reading", read)
+            read(report)
 
     def run(self, stop: Event) -> None:
         """Do what pages ask for, until `stop` is set."""
@@ -217,3 +229,9 @@ class Station:
         self._publish("station", message("station", doing=doing, why=why))
         if not doing:
             self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
+
+
+def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
+    """Return the message on the bar about the state of the glove's devices."""
+    lost = ", ".join(f"{device.name} lost" for device in devices if not device.connected)
+    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"})

@@ -159,14 +159,24 @@ class CollectionGuide:
         self.stage: Stage = "ready" if self._left else "done"
 
     @property
+    def accepted(self) -> tuple[int, ...]:
+        """The numbers of the accepted trials, in the order of acceptance."""
+        return tuple(trial.number for trial, accepted in self._past if accepted)
+
+    @property
     def done(self) -> int:
         """The number of accepted trials."""
-        return sum(accepted for _, accepted in self._past)
+        return len(self.accepted)
 
     @property
     def skipped(self) -> int:
         """The number of trials skipped in this sitting."""
         return len(self._past) - self.done
+
+    @property
+    def session(self) -> Session:
+        """What is recorded."""
+        return self._recorder.session
 
     @property
     def trial(self) -> Trial | None:
@@ -178,11 +188,16 @@ class CollectionGuide:
         """The newest frames; in review, those that were captured."""
         return self._captured if self.stage == "review" else (self._switches, self._glove)
 
+    @property
+    def waits(self) -> bool:
+        """Whether no countdown can start, because something is not read."""
+        return bool(self.lost) and self.stage in _WAITING
+
     def offered(self) -> dict[Key, str]:
         """Return the keys that are active now, and their effects."""
         if self.stage == "over":
             return {}
-        found = {} if self.lost and self.stage in _WAITING else dict(_OFFERED[self.stage])
+        found = {} if self.waits else dict(_OFFERED[self.stage])
         if self._left:
             found["skip"] = "skip this one"
         if self._past:
@@ -286,7 +301,7 @@ class CollectionGuide:
 
     def _lack(self, now_us: int, oldest_us: int) -> str:
         """Return the inputs that are not read in frames of at most this age, as a sentence; "" if all is."""
-        session = self._recorder.session
+        session = self.session
         if session.switches or session.taxels:
             if self._switches is None or now_us - self._switches.time_us > oldest_us:
                 return f"the {'switches' if session.switches else 'taxels'} are silent"

@@ -101,6 +101,12 @@ function show(message) {
     return entry;
   });
   $("legend").replaceChildren(...entries);
+  // A link of the page Compare names a trial and its type.
+  const linked = decodeURIComponent(location.hash.slice(1));
+  if (linked) {
+    history.replaceState(null, "", location.pathname);
+    selected = reply.truth.flatMap((truth, trial) => (`${set.trials[trial].replace(/, session .*/, "")}: ${type(truth)}` === linked ? [trial] : []));
+  }
   select(selected.filter((trial) => trial < reply.truth.length));
 }
 

@@ -15,10 +15,11 @@ import click
 import numpy as np
 import pytest
 
-from thenar.cli import collecting, run
+from thenar.cli import run
 from thenar.cli.group import COMMANDS, thenar
 from thenar.cli.parameters import OutputFile, OutputFolder
 from thenar.compiler import GraspSet
+from thenar.studio import collecting
 
 # Arguments and options of a small run of each command. Its devices are not there.
 LINES: dict[str, tuple[str, str]] = {
@@ -40,6 +41,7 @@ LINES: dict[str, tuple[str, str]] = {
     ),
     "compile": ("set.grasps", "-o new --rounds 2 --folds 0 --no-report"),
     "adapt": ("build set.grasps", "-o new"),
+    "compare": ("build build set.grasps", ""),
     "verify": ("build set.grasps", ""),
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),

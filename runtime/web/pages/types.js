@@ -40,6 +40,15 @@ export function chip({ code, colour, ink }) {
   return made;
 }
 
+/** Return an element with the code of a type, and its name where that differs. */
+export function tag(styles, name) {
+  const made = document.createElement("span"), style = styles.get(name), text = document.createElement("span");
+  text.textContent = name;
+  text.className = style.code === name ? "unseen" : "";
+  made.append(chip(style), style.code === name ? "" : " ", text);
+  return made;
+}
+
 // The best first: a short name itself, the initials of several words, two letters, three, a letter with a number.
 function candidates(name) {
   const letters = name.match(/[\p{L}\p{N}]/gu) ?? ["T"], [first, ...rest] = letters;

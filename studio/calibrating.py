@@ -1,0 +1,205 @@
+"""A calibration while it runs: the joints of a glove pose by pose, or its taxels at rest and pressed.
+
+Like a collection, it is led by a view, the terminal or a page, and needs no trainer.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from threading import Event
+from time import monotonic
+from typing import Any, Literal
+
+from msgspec.structs import replace
+
+from thenar.drivers.cyberglove import CyberGlove
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us, old_after_us
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.wiring import Harness, StreamWiring
+from thenar.runtime.live.sources import Sources
+from thenar.runtime.posing import PoseGuide, PoseKey
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.taxels import TaxelCalibration, TaxelSettings, learnt_lines
+
+from .collecting import WAIT_US
+
+Codes = tuple[int | None, ...]
+# What is asked of the hand while taxels are calibrated.
+PressStage = Literal["untouched", "resting", "pressing"]
+PRESS_WORDS: dict[PressStage, str] = {
+    "untouched": "Leave every taxel alone, the hand open: press nothing.",
+    "resting": "Keep still.",
+    "pressing": "Press every taxel once, firmly, for half a second each, in any order.",
+}
+
+_WAIT_S = 0.05
+_PATIENCE_S = 5.0
+# Nobody presses for an hour during a calibration.
+_MOST_FRAMES = 1_000_000
+
+
+def lead_poses(
+    port: str,
+    baud: int,
+    hold_s: float,
+    view: Callable[[PoseGuide], Iterable[PoseKey]],
+    stop: Event,
+    note: Callable[[str], None] = lambda _: None,
+) -> PoseGuide | None:
+    """Lead through the poses of a CyberGlove, or of the joints of a glove.toml.
+
+    Parameters
+    ----------
+    port : str
+        Its port, or the path of a glove.toml.
+    baud : int
+        The baud rate of a port.
+    hold_s : float
+        How long a pose is held, seconds.
+    view : callable
+        Gets the guide after every reading, and returns the keys pressed since.
+    stop : Event
+        Ends it.
+    note : callable
+        Gets what the glove says that is odd, in sentences.
+
+    Returns
+    -------
+    PoseGuide or None
+        With all poses taken; None if it was stopped.
+
+    Raises
+    ------
+    DeviceError, SettingError
+        If the glove is not there, or sends no joints.
+    """
+    with _posing(port, baud, hold_s, note) as (guide, take):
+        while guide.stage != "done" and not stop.is_set():
+            take()
+            for key in view(guide):
+                guide.press(now_us(), key)
+        return guide if guide.stage == "done" else None
+
+
+def lead_presses(
+    glove: Path,
+    hold_s: float,
+    view: Callable[[PressStage, tuple[str, ...], Codes, Codes], bool],
+    stop: Event,
+    subject: str,
+    newtons: float | None = None,
+) -> tuple[tuple[str, ...], TaxelCalibration] | None:
+    """Learn the counts of the taxels of a glove.toml at rest, for `hold_s`, and while each is pressed once.
+
+    `view` gets the stage, the names of all taxels, their newest counts and those at rest, after every reading; it
+    returns whether the person is ready. Return the names, and the calibration of the taxels that moved; None if `stop`
+    was set.
+
+    Raises DeviceError if no device sends taxels, SettingError if there are none.
+    """
+    with _sources(glove, taxels=True) as (harness, sources):
+        codes, rested, names = list[Codes](), list[Codes](), harness.taxel_names
+        nothing: Codes = (None,) * len(names)
+
+        def take() -> list[Codes]:
+            arrived = sources.take(WAIT_US).arrived
+            codes.extend(one.taxels for one in arrived if isinstance(one, SwitchFrame) and one.taxels is not None)
+            del codes[:-_MOST_FRAMES]
+            return codes
+
+        def ready(stage: PressStage) -> bool:
+            take()
+            newest = (found[-1] if found else nothing for found in (codes, rested))
+            return view(stage, names, *newest) or stop.is_set()
+
+        _await(sources, take, "taxels")
+        while not ready("untouched"):
+            pass
+        codes.clear()
+        end = monotonic() + hold_s
+        while (monotonic() < end or not codes) and not stop.is_set():
+            ready("resting")
+        rested.extend(codes)
+        codes.clear()
+        while not ready("pressing"):
+            pass
+        if stop.is_set():
+            return None
+        lines = learnt_lines(names, rested, codes, 1.0 if newtons is None else newtons)
+        return names, TaxelCalibration(subject=subject, unit="press" if newtons is None else "N", taxels=lines)
+
+
+@contextmanager
+def _sources(glove: Path, *, taxels: bool) -> Iterator[tuple[Harness, Sources]]:
+    """Yield the harness that is calibrated, and its open devices: those with taxels, or the device with joints.
+
+    Raises SettingError if there are none.
+    """
+    harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file to be written
+    if taxels and not harness.taxel_names:
+        raise SettingError(f"{glove.name} names no taxels: add `taxels` to a [[stream]], or add a converter")
+    if not taxels:
+        device = harness.joint_device
+        if not isinstance(device, StreamWiring):
+            raise SettingError(f"{glove.name} has no joints: add a [cyberglove], or `joints` to a [[stream]]")
+        harness = replace(harness, buses=(), spi=(), streams=(device,))
+    with Sources(harness, (), whole_scan(harness, (), every_taxel=taxels)) as sources:
+        yield harness, sources
+
+
+def _await(sources: Sources, read: Callable[[], Any], what: str) -> None:
+    """Wait until something is read. Raises DeviceError if no data comes, SettingError for a device that cannot work."""
+    end = monotonic() + _PATIENCE_S
+    while not read():
+        sources.raise_settings()
+        if monotonic() > end:
+            wrong = [f"{device.name}: {device.error}" for device in sources.devices() if device.error]
+            raise DeviceError(f"{wrong[0] if wrong else f'no device sends {what}'}; nothing is calibrated")
+
+
+@contextmanager
+def _posing(
+    port: str, baud: int, hold_s: float, note: Callable[[str], None]
+) -> Iterator[tuple[PoseGuide, Callable[[], None]]]:
+    """Yield a guide through the poses of a CyberGlove, or of the stream of a glove.toml, and a function that waits for
+    the next bytes and passes them to it.
+    """
+
+    def take(read: Callable[[], bytes | None], guide: PoseGuide) -> None:
+        raw = read()
+        if raw is not None:
+            guide.take(now_us(), raw)
+
+    def row() -> bytes | None:
+        """Return the newest row that measures every joint."""
+        arrived = sources.take(WAIT_US).arrived
+        whole = [frame.sensors for frame in arrived if isinstance(frame, GloveFrame) and 0 not in frame.sensors]
+        return whole[-1] if whole else None
+
+    def record() -> bytes | None:
+        timed = glove.read(_WAIT_S)
+        if timed is not None and timed[1].fault == "unplugged":
+            raise DeviceError(f"{port}: the glove is not plugged into its box")
+        return None if timed is None else timed[1].sensors
+
+    hold_us, names = round(hold_s * 1e6), tuple[str, ...]()
+    if port.endswith(".toml"):
+        wired = load_harness(port).cyberglove
+        if wired is None:
+            with _sources(Path(port), taxels=False) as (harness, sources):
+                _await(sources, row, "joints")
+                guide = PoseGuide(harness.sensor_names, hold_us, old_after_us(sources.glove_period_us))
+                yield guide, partial(take, row, guide)
+            return
+        port, baud, names = wired.port, wired.baud, wired.joints
+    glove = CyberGlove(port, baud=baud)
+    try:
+        info = glove.open()
+        for sentence in info.notes:
+            note(sentence)
+        guide = PoseGuide(names or info.names, hold_us, old_after_us(None))
+        yield guide, partial(take, record, guide)
+    finally:
+        glove.close()

@@ -1,0 +1,213 @@
+// The page Glove: a glove is connected, watched and calibrated.
+import { drawHand } from "./hand.js";
+import { openPage } from "./shell.js";
+import { cell, list, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+const SVG = "http://www.w3.org/2000/svg";
+const PAST_S = 30, ASK_MS = 500;
+const KINDS = { joint: "joints", pad: "pads" };
+
+let about = null; // the message on the glove
+let hand = null;
+let spots = []; // what is drawn of each sensor, by its number
+let buttons = []; // and its button in the list
+let states = [];
+let chosen = null; // the number of the sensor whose past is shown
+let problem = null;
+let begun = false; // whether this page began to watch
+
+const ask = openPage({
+  open: () => (begun = false),
+  "glove-hand": (message) => showGlove(message),
+  station: ({ doing, why }) => {
+    say($("watch"), doing === "watching" ? "Watch anew" : "Watch");
+    if (why) say($("refused"), why);
+    if (doing) begun = true;
+    watchOnce(doing);
+  },
+  found: (message) => showFound(message),
+  "glove-state": (message) => showState(message),
+  shown: (message) => plot(message),
+  calibrating: (message) => showStep(message),
+  calibrated: ({ said }) => say($("calibrated"), said),
+});
+
+/** A page that is opened while nothing uses the glove begins to watch it. */
+function watchOnce(doing = "") {
+  if (!about?.there || about.why || begun || doing) return;
+  begun = true;
+  ask("watch");
+}
+
+function showGlove(message) {
+  about = message;
+  $("connecting").hidden = about.there;
+  $("with-glove").hidden = !about.there;
+  if (about.why) say($("refused"), about.why);
+  $("ports").replaceChildren(...about.ports.map((port) => new Option(port)));
+  const ports = about.ports.length ? `Ports here: ${about.ports.join(", ")}. ` : "";
+  say($("addresses"), `${ports}Or tcp://HOST:PORT, udp://0.0.0.0:PORT, ble://NAME, or the path of a serial port.`);
+  if (!about.hand) return;
+  hand = drawHand($("hand"), about.hand, { onSwitch: (sensor) => choose(sensor) });
+  $("hand").hidden = !about.hand.switches.length && !about.hand.taxels.length && !about.hand.joints.length;
+  const drawn = new Map([...$("hand").querySelectorAll("[role=button]")].map((spot) => [spot.getAttribute("aria-label"), spot]));
+  spots = about.names.map((name) => drawn.get(name) ?? null);
+  // A spot says its state, and is no switch to turn on.
+  for (const spot of drawn.values()) spot.removeAttribute("aria-pressed");
+  buttons = about.names.map((name, sensor) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = name;
+    button.addEventListener("click", () => choose(sensor));
+    return button;
+  });
+  $("sensors").replaceChildren(
+    ...buttons.map((button) => {
+      const item = document.createElement("li");
+      item.append(button);
+      return item;
+    }),
+  );
+  const kinds = Object.keys(KINDS).filter((kind) => about.kinds.includes(kind));
+  $("calibrate").replaceChildren(
+    ...kinds.map((kind) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "plain";
+      button.textContent = `Calibrate the ${KINDS[kind]}${about.lacks.includes(kind) ? "" : " anew"}`;
+      button.addEventListener("click", () => ask("calibrate", { name: kind }));
+      return button;
+    }),
+  );
+  states = [];
+  choose(null);
+  watchOnce();
+}
+
+function showFound({ port, busy, columns, rows, remarks, text, wrong }) {
+  $("found").hidden = false;
+  say($("found-heading"), busy ? `Listening to ${port}: press every switch and pad, bend every finger` : `${rows} rows came from ${port}`);
+  $("connect").hidden = $("proposal").hidden = busy || wrong.length > 0;
+  $("columns-scroll").hidden = busy || !columns.length;
+  list($("remarks"), busy ? [] : [...wrong, ...remarks]);
+  if (busy) return;
+  say($("proposal"), text);
+  $("columns").replaceChildren(
+    ...columns.map(({ column, least, greatest, taken_for }) => {
+      const row = document.createElement("tr");
+      row.append(cell("th", column), ...[least, greatest, taken_for].map((one) => cell("td", one === null ? "" : String(one))));
+      return row;
+    }),
+  );
+}
+
+function showState(message) {
+  if (!about?.hand || message.states.length !== about.names.length) return;
+  hand.setClosed(message.closed, message.lost);
+  hand.setTaxels(message.pressed);
+  hand.setPose(message.values);
+  message.states.forEach((state, sensor) => {
+    if (state === states[sensor]) return;
+    for (const element of [spots[sensor], buttons[sensor]].filter(Boolean)) {
+      element.dataset.state = state;
+      element.setAttribute("aria-label", `${about.names[sensor]}: ${state}`);
+    }
+  });
+  states = message.states;
+  const counts = ["ok", "stuck", "never seen", "lost"].map((state) => [states.filter((one) => one === state).length, state]);
+  say($("counted"), counts.filter(([count]) => count).map(([count, state]) => `${count} ${state}`).join(", "));
+  problem = message.problem;
+  say($("problem"), problem?.words ?? "No problem: every sensor works.");
+  $("problem").disabled = !problem;
+  say($("rates"), Object.entries(message.rates).map(([what, rate]) => `${what}: ${rate.toFixed(1)} readings a second`).join("; "));
+  const rows = message.devices.map(({ name, connected, error, counts: counted }) => [
+    name,
+    connected ? error || "connected" : `lost: ${error}`,
+    counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
+  ]);
+  if (JSON.stringify(rows) === $("devices").dataset.rows) return;
+  $("devices").dataset.rows = JSON.stringify(rows);
+  $("devices").replaceChildren(
+    ...rows.map(([name, ...rest]) => {
+      const row = document.createElement("tr");
+      row.append(cell("th", name), ...rest.map((one) => cell("td", one)));
+      return row;
+    }),
+  );
+}
+
+function choose(sensor) {
+  chosen = sensor;
+  buttons.forEach((button, at) => button.setAttribute("aria-pressed", String(at === sensor)));
+  $("one").hidden = sensor === null;
+  if (sensor === null) return;
+  say($("one-heading"), `${about.names[sensor]}, ${about.kinds[sensor]}`);
+  ask("past", { trial: sensor });
+}
+
+setInterval(() => {
+  if (chosen !== null && states.length && !document.hidden) ask("past", { trial: chosen });
+}, ASK_MS);
+
+/** Draw what a sensor showed: steps from change to change, and a gap while it was lost. */
+function plot({ sensor, past, changes }) {
+  if (sensor !== chosen) return;
+  const values = past.map(([, value]) => value).filter((value) => value !== null);
+  const low = Math.min(...values, about.kinds[sensor] === "switch" ? 0 : Infinity), high = Math.max(...values, low + 1);
+  const y = (value) => (110 - (100 * (value - low)) / (high - low)).toFixed(1);
+  const x = (ago) => (600 * (1 - ago / PAST_S)).toFixed(1);
+  const steps = past.map(([ago, value], at) => {
+    const until = past[at + 1]?.[0] ?? 0;
+    const joined = at && past[at - 1][1] !== null ? "L" : "M";
+    return value === null ? "" : `${joined}${x(ago)} ${y(value)}H${x(until)}`;
+  });
+  const line = $("plot").firstElementChild ?? $("plot").appendChild(document.createElementNS(SVG, "path"));
+  line.setAttribute("d", steps.join(""));
+  const now = past.at(-1)?.[1];
+  const shown = now === null || now === undefined ? "not read" : about.kinds[sensor] === "switch" ? ["open", "closed"][now] : now;
+  const range = values.length && about.kinds[sensor] !== "switch" ? `; ${Math.min(...values)} to ${Math.max(...values)}` : "";
+  say($("one-says"), `${states[sensor] ?? ""}; now ${shown}; ${changes} changes in 30 s${range}`);
+}
+
+$("problem").addEventListener("click", () => {
+  if (problem?.calibrate) ask("calibrate", { name: problem.calibrate });
+  else if (problem && problem.sensor !== null) {
+    choose(problem.sensor);
+    buttons[problem.sensor].focus();
+  } else ask("watch");
+});
+
+function showStep({ step, what, problems, faults, keys }) {
+  const open = Boolean(step);
+  if (open === $("calibration").hidden) $("refused").textContent = open ? "" : $("refused").textContent;
+  $("calibration").hidden = !open;
+  if (!open) return;
+  say($("step"), step);
+  say($("what"), what);
+  list($("problems"), problems);
+  list($("faults"), faults);
+  const words = Object.entries(keys);
+  if (words.map(String).join() === $("keys").dataset.keys) return;
+  $("keys").dataset.keys = words.map(String).join();
+  const made = words.map(([key, said]) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.dataset.key = key;
+    button.textContent = said;
+    button.addEventListener("click", () => ask("step", { name: key }));
+    return button;
+  });
+  $("keys").replaceChildren(...made);
+  made[0]?.focus();
+}
+
+$("form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  ask("find", { name: $("address").value.trim() });
+});
+$("connect").addEventListener("click", () => {
+  begun = false;
+  ask("connect");
+});
+$("watch").addEventListener("click", () => ask("watch"));

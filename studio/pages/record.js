@@ -1,0 +1,183 @@
+// The page Record: a collection is begun, led key by key, and ends with a set.
+import { drawGrasp } from "./grasps.js";
+import { drawHand } from "./hand.js";
+import { openPage } from "./shell.js";
+import { list, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+const percent = (share) => (100 * share).toFixed(1);
+const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
+
+let stage = "over";
+let doing = ""; // what the collection is for
+let sensors = 0; // of the project's set, for Train
+let drawn = null; // the message on the glove's hand
+let hand = null;
+let pictured = null; // the grasp type that is drawn
+let edited = false; // whether the person's name was typed here
+
+const ask = openPage({
+  shell: ({ wearer }) => {
+    if (!edited) $("subject").value = wearer;
+  },
+  recordings: ({ unfinished, taxonomies, objects, glove }) => {
+    $("no-glove").hidden = glove;
+    $("start").disabled = !glove;
+    say($("objects"), objects ? "Objects are those of objects.toml." : "");
+    const before = $("taxonomy").value;
+    $("taxonomy").replaceChildren(...taxonomies.map((name) => new Option(name === "own" ? "own, of objects.toml" : name, name)));
+    $("taxonomy").value = taxonomies.includes(before) ? before : taxonomies.includes("own") ? "own" : taxonomies[0];
+    $("unfinished").hidden = !unfinished.length;
+    const items = unfinished.map(({ id, name, subject, done, total }) => {
+      const item = document.createElement("li"), button = document.createElement("button");
+      button.type = "button";
+      button.textContent = `Continue ${name} of ${subject}: ${done} of ${total} trials are done`;
+      button.addEventListener("click", () => ask("continue", { id }));
+      item.append(button);
+      return item;
+    });
+    $("recordings").replaceChildren(...items);
+  },
+  collecting: (state) => show(state),
+  trials: (message) => showTrials(message),
+  "glove-hand": (message) => {
+    drawn = message.hand;
+    hand = null;
+  },
+  recorded: ({ trial, grasp, thing, closed, pressed, values }) => {
+    $("seen").hidden = false;
+    say($("seen-heading"), `Trial ${trial}: ${grasp}, ${thing}`);
+    if (drawn) hand ??= drawHand($("hand"), drawn);
+    hand?.setClosed(closed);
+    hand?.setTaxels(pressed);
+    hand?.setPose(values);
+  },
+  finished: ({ set, size, warnings, done, total }) => {
+    $("end").hidden = !set || stage !== "over";
+    if (!set) return;
+    say($("end-heading"), `Recorded: ${set}`);
+    say($("size"), `${size}; ${done} of ${total} trials are done`);
+    list($("warnings"), warnings.length ? warnings : ["The import has no warning."]);
+  },
+  set: ({ why, sensors: all }) => {
+    sensors = all.length;
+    $("train").disabled = Boolean(why);
+    if (why) say($("work"), why);
+  },
+  work: ({ done, total, what, why }) => {
+    const busy = { reading: "reading", train: "training" }[what] ?? what;
+    say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
+  },
+  train: ({ folder, facts }) => {
+    $("build").hidden = false;
+    say($("build-heading"), `Trained: ${folder}`);
+    list($("facts"), facts);
+  },
+  station: ({ why }) => {
+    if (why) say($("refused"), why);
+  },
+});
+
+function show(state) {
+  const { prompt, thing, standing, keys, done, total, skipped, number, grasp, waits } = state;
+  const before = stage;
+  stage = state.stage;
+  const over = stage === "over";
+  // It was begun on the page Wearer, which adapts a build to the trials.
+  if (over && doing === "wearer") location.href = "wearer.html";
+  doing = state.doing;
+  $("begin").hidden = !over;
+  $("leading").hidden = over;
+  if (over) return;
+  $("end").hidden = true;
+  if (before === "over") say($("refused"), "");
+  if (stage === "waiting") {
+    say($("prompt"), "Waiting for the glove …");
+    for (const id of ["thing", "standing", "place"]) say($(id), "");
+    $("keys").replaceChildren();
+    return;
+  }
+  say($("place"), `${Math.min(number, total)} of ${total}; ${done} done${skipped ? `, ${skipped} skipped` : ""}`);
+  say($("prompt"), prompt);
+  say($("thing"), thing);
+  say($("standing"), standing);
+  $("standing").dataset.is = waits ? "bad" : stage === "review" ? "good" : stage === "countdown" ? "changing" : "";
+  // Seconds that are counted down are not read out.
+  if (stage !== before || waits) say($("spoken"), `${prompt}, ${thing}. ${stage === "countdown" ? "" : standing}`);
+  if (grasp !== pictured) {
+    pictured = grasp;
+    const known = drawGrasp($("drawing"), grasp);
+    $("drawn").hidden = !grasp;
+    $("drawing").hidden = !known;
+    say($("drawing-says"), known ? "" : `No picture of ${grasp}: hold the ${thing.replace(/^object /, "")} as you agreed.`);
+  }
+  showKeys(keys);
+}
+
+/** Show the keys that count now as buttons; the first is the one that Enter presses, and has the focus. */
+function showKeys(keys) {
+  const words = Object.entries(keys);
+  if (words.map(String).join() === $("keys").dataset.keys) return;
+  $("keys").dataset.keys = words.map(String).join();
+  const focused = !document.activeElement || document.activeElement === document.body || $("leading").contains(document.activeElement);
+  const buttons = words.map(([key, what]) => {
+    const button = document.createElement("button"), letter = document.createElement("kbd");
+    button.type = "button";
+    button.dataset.key = key;
+    letter.textContent = LETTERS[key];
+    button.append(what, letter);
+    button.addEventListener("click", () => ask("key", { name: key }));
+    return button;
+  });
+  $("keys").replaceChildren(...buttons);
+  // During the countdown Enter is expected next, not now: no button takes it by accident.
+  if (focused && "accept" in keys) buttons[0].focus();
+}
+
+document.addEventListener("keydown", (event) => {
+  if (stage === "over" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
+  const button = event.target.closest?.("button, a, input, select");
+  const found = Object.entries(LETTERS).find(([, letter]) => letter === event.key || letter === event.key.toLowerCase());
+  if (!found || (event.key === "Enter" && button)) return;
+  event.preventDefault();
+  ask("key", { name: found[0] });
+});
+
+function showTrials({ trials, accuracy }) {
+  $("so-far").hidden = !trials.length;
+  $("seen").hidden = true;
+  say($("accuracy"), accuracyWords(accuracy));
+  const strip = $("strip"), same = [...strip.children].findIndex((item, at) => item.dataset.trial !== String(trials[at]?.[0]));
+  const keep = same < 0 ? Math.min(strip.children.length, trials.length) : same;
+  while (strip.children.length > keep) strip.lastChild.remove();
+  for (const [trial, grasp, thing] of trials.slice(keep)) {
+    const item = document.createElement("li"), button = document.createElement("button");
+    item.dataset.trial = trial;
+    button.type = "button";
+    button.textContent = `${trial}: ${grasp}`;
+    button.title = thing;
+    button.addEventListener("click", () => ask("recorded", { trial }));
+    item.append(button);
+    strip.append(item);
+  }
+  $("strip-scroll").scrollLeft = strip.scrollWidth;
+}
+
+function accuracyWords(accuracy) {
+  if (!accuracy) return "An accuracy is shown from two trials of every type on.";
+  if (accuracy.why) return `No accuracy: ${accuracy.why}`;
+  const { mean, low, high, of } = accuracy;
+  return `All sensors tell these trials apart in ${percent(mean)} % [${percent(low)}, ${percent(high)}], ${of}; quick: not nested`;
+}
+
+$("subject").addEventListener("input", () => (edited = true));
+$("form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  ask("record", {
+    name: $("subject").value.trim(),
+    id: $("taxonomy").value,
+    value: Number($("repetitions").value),
+    trial: Number($("none").checked),
+  });
+});
+$("train").addEventListener("click", () => ask("train", { sensors: [...Array(sensors).keys()] }));

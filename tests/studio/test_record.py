@@ -1,0 +1,232 @@
+"""The page *Record*, in Chromium as a person uses it, with an emulated glove, and through its WebSocket."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.select import Select
+from websockets.sync.client import connect
+from websockets.typing import Origin
+
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.drivers.emulated.lines import BoardSender, LineServer
+from thenar.runtime.recording.guide import read_journal
+from thenar.studio import Studio
+
+from ..browser import Browser
+
+Start = Callable[..., Studio]
+PATIENCE_S = 30
+SWITCHES = ("s1", "s2", "s3")
+OBJECTS = 'PoS = ["bottle"]\nTip = ["pin"]\nLat = ["key"]\n'
+# What is held in each grasp.
+HELD = {
+    "Power": {"s1": 1, "s2": 1, "s3": 1},
+    "Tip": {"s1": 1, "s2": 0, "s3": 0},
+    "Lateral": {"s1": 0, "s2": 1, "s3": 0},
+}
+
+
+@pytest.fixture
+def line() -> Iterator[LineServer]:
+    with LineServer() as line:
+        yield line
+
+
+@pytest.fixture
+def board(line: LineServer) -> Iterator[BoardSender]:
+    with BoardSender(line.send, SWITCHES, ("j1", "p1"), 200) as board:
+        board.show({"j1": 100, "p1": 300})
+        yield board
+
+
+@pytest.fixture
+def folder(tmp_path: Path, line: LineServer) -> Path:
+    """Return the folder of a project with a glove and objects of three types."""
+    folder = tmp_path / "recorded"
+    folder.mkdir()
+    (folder / "glove.toml").write_text(
+        f'name = "bench"\n[[stream]]\nport = "{line.port}"\nrate_hz = 200\nswitches = {json.dumps(SWITCHES)}\n'
+        "joints = { j1 = [0, 254] }\ntaxels = { p1 = [0, 1023] }\n"
+    )
+    (folder / "objects.toml").write_text(OBJECTS)
+    return folder
+
+
+def begin(browser: Browser, *, repetitions: int = 2, none: bool = False, subject: str = "Anna") -> None:
+    """Fill in the form, and start."""
+    browser.wait(lambda: browser.texts("#taxonomy option"))
+    name = browser.driver.find_element(By.ID, "subject")
+    name.clear()
+    name.send_keys(subject)
+    Select(browser.driver.find_element(By.ID, "taxonomy")).select_by_value("kamakura14")
+    number = browser.driver.find_element(By.ID, "repetitions")
+    number.clear()
+    number.send_keys(str(repetitions))
+    if not none:
+        browser.click("none")
+    browser.click("start")
+
+
+def stage(browser: Browser, key: str) -> bool:
+    """Return whether a key is offered."""
+    return bool(browser.script("return document.querySelector(`#keys [data-key=${arguments[0]}]`)", key))
+
+
+def hold(browser: Browser, board: BoardSender) -> None:
+    """Hold the grasp that the page asks for, until it is captured."""
+    # No two trials are the same.
+    angle = 50 + 7 * int(browser.text("place").split(" ")[0])
+    board.show(HELD[browser.text("prompt").split(" ")[0]] | {"j1": angle})
+    browser.wait(lambda: browser.text("standing").startswith("captured: "))
+
+
+def open_record(browser: Browser, studio: Studio, **how: int | str) -> None:
+    browser.open(f"{studio.server.url}record.html", **how)  # type: ignore[arg-type]
+    browser.wait(lambda: browser.text("link").startswith("page: connected"))
+
+
+def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
+    browser: Browser, studio: Start, folder: Path, board: BoardSender
+) -> None:
+    """Six trials; every second one is accepted with Enter, which the button has the focus for."""
+    open_record(browser, studio(None))
+    begin(browser)
+    browser.wait(lambda: stage(browser, "accept"))
+    assert browser.script("return document.activeElement.dataset.key") == "accept"
+    assert browser.axe() == []
+    browser.driver.switch_to.active_element.send_keys(Keys.ENTER)
+    for number in range(1, 7):
+        browser.wait(lambda number=number: browser.text("place").startswith(f"{number} of 6"))  # type: ignore[misc]
+        assert browser.script("return document.querySelector('#drawing .object') !== null")
+        assert "two trials of every type" in browser.text("accuracy") or number == 1
+        hold(browser, board)
+        if number == 1:
+            browser.driver.find_element(By.TAG_NAME, "body").send_keys("r")
+            browser.wait(lambda: not browser.text("standing").startswith("captured"))
+            hold(browser, board)
+        accept = browser.driver.find_element(By.CSS_SELECTOR, "#keys [data-key=accept]")
+        if number % 2:
+            accept.click()
+        else:
+            assert browser.driver.switch_to.active_element == accept
+            accept.send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.text("prompt") == "no trial is left")
+    assert "All sensors tell these trials apart in 100.0 % [" in browser.text("accuracy")
+    assert "quick" in browser.text("accuracy")
+    assert len(browser.texts("#strip button")) == 6
+    browser.driver.find_elements(By.CSS_SELECTOR, "#strip button")[0].click()
+    browser.wait(lambda: browser.text("seen-heading").startswith("Trial 1: "))
+    grasp = browser.text("seen-heading").split(": ")[1].split(",")[0]
+    held = {"PoS": 3, "Tip": 1, "Lat": 1}[grasp]
+    assert len(browser.driver.find_elements(By.CSS_SELECTOR, "#hand .closed")) == held
+    browser.picture("record-trials")
+    browser.driver.find_element(By.CSS_SELECTOR, "#keys [data-key=accept]").click()
+    browser.wait(lambda: browser.text("end-heading") == "Recorded: Anna.grasps")
+    recorded = GraspSet.load(folder / "Anna.grasps")
+    assert sorted(recorded.grasps.tolist()) == ["Lat", "Lat", "PoS", "PoS", "Tip", "Tip"]
+    assert {*recorded.subjects.tolist()} == {"Anna"}
+    assert "6 of 6 trials are done" in browser.text("size")
+    assert browser.texts("#warnings li")
+    assert browser.axe() == []
+    browser.wait(lambda: not browser.script("return document.getElementById('train').disabled"))
+    browser.click("train")
+    browser.wait(lambda: browser.text("build-heading") == "Trained: build")
+    assert (folder / "build" / "build.json").exists()
+    assert browser.axe() == []
+
+
+def test_the_countdown_waits_while_the_glove_is_away_and_a_restart_continues(
+    browser: Browser, studio: Start, folder: Path, line: LineServer
+) -> None:
+    first = studio(None)
+    open_record(browser, first)
+    port = int(line.port.rpartition(":")[2])
+    with BoardSender(line.send, SWITCHES, ("j1", "p1"), 200) as board:
+        begin(browser, repetitions=1)
+        browser.wait(lambda: stage(browser, "accept"))
+        browser.driver.switch_to.active_element.send_keys(Keys.ENTER)
+        hold(browser, board)
+        line.close()
+        browser.driver.find_element(By.CSS_SELECTOR, "#keys [data-key=accept]").click()
+        browser.wait(lambda: browser.text("standing").startswith("the countdown waits: "))
+        assert not stage(browser, "accept")
+        assert browser.script("return document.getElementById('glove-state').dataset.is") == "bad"
+        assert browser.axe() == []
+    with LineServer(port) as again, BoardSender(again.send, SWITCHES, ("j1", "p1"), 200) as board:
+        browser.wait(lambda: stage(browser, "accept"))
+        browser.driver.find_element(By.TAG_NAME, "body").send_keys("q")
+        browser.wait(lambda: browser.text("end-heading") == "Recorded: Anna.grasps")
+        assert "1 of 3 trials are done" in browser.text("size")
+        first.close()
+        second = studio(None)
+        open_record(browser, second)
+        browser.wait(lambda: browser.texts("#recordings button"))
+        assert browser.texts("#recordings button") == ["Continue Anna.mcap of Anna: 1 of 3 trials are done"]
+        browser.driver.find_element(By.CSS_SELECTOR, "#recordings button").click()
+        browser.wait(lambda: stage(browser, "accept"))
+        assert len(browser.texts("#strip button")) == 1
+        browser.driver.switch_to.active_element.send_keys(Keys.ENTER)
+        hold(browser, board)
+        browser.driver.find_element(By.CSS_SELECTOR, "#keys [data-key=accept]").click()
+        browser.wait(lambda: browser.text("place").startswith("3 of 3"))
+        hold(browser, board)
+        browser.driver.find_element(By.TAG_NAME, "body").send_keys("u")
+        browser.wait(lambda: len(browser.texts("#strip button")) == 1)
+        browser.driver.find_element(By.TAG_NAME, "body").send_keys("q")
+        browser.wait(lambda: "1 of 3" in browser.text("size"))
+    assert len(read_journal(folder / "Anna.mcap").accepted) == 1
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(400, "light"), (1400, "dark")])
+def test_it_can_be_used_by_everybody(
+    browser: Browser, studio: Start, folder: Path, board: BoardSender, width: int, scheme: str
+) -> None:
+    opened = studio(None)
+    open_record(browser, opened, width=width, scheme=scheme)
+    browser.wait(lambda: browser.texts("#taxonomy option"))
+    assert browser.axe() == []
+    begin(browser, none=True)
+    browser.wait(lambda: stage(browser, "accept"))
+    browser.picture(f"record-{width}")
+    assert browser.axe() == []
+    assert browser.script("return document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize(
+    ("asked", "why"),
+    [
+        ({"do": "record", "name": "a/b", "id": "kamakura14", "value": 2}, "is not possible"),
+        ({"do": "record", "name": "", "id": "kamakura14", "value": 2}, "subject"),
+        ({"do": "record", "name": "Anna", "id": "../kamakura14", "value": 2}, "no taxonomy is called"),
+        ({"do": "record", "name": "Anna", "id": "kamakura14", "value": 0}, "whole number from 1"),
+        ({"do": "record", "name": "Anna", "id": "kamakura14", "value": 1e9}, "whole number from 1"),
+        ({"do": "record", "name": "Anna", "id": "kamakura14", "value": 2.5}, "whole number from 1"),
+        ({"do": "record", "name": "Anna", "id": "kamakura14"}, "whole number from 1"),
+        ({"do": "continue", "id": "../glove.toml"}, "the project has no recording"),
+        ({"do": "key", "name": "explode"}, "there is no key"),
+        ({"do": "recorded", "trial": 99}, "was not recorded"),
+    ],
+)
+def test_what_no_page_sends_is_refused(studio: Start, folder: Path, asked: dict[str, object], why: str) -> None:
+    opened = studio(None)
+    parts, before = urlsplit(opened.server.url), {*folder.iterdir()}
+    with connect(f"ws://{parts.netloc}/live?topics=none", origin=Origin(f"http://{parts.netloc}"), proxy=None) as live:
+        live.send(json.dumps(asked))
+        told = json.loads(live.recv(timeout=PATIENCE_S))
+    assert told["topic"] == "refused"
+    assert why in told["why"]
+    assert {*folder.iterdir()} == before
+    assert opened.station.doing == ""
+
+
+def test_without_a_glove_nothing_is_recorded(browser: Browser, studio: Start) -> None:
+    open_record(browser, studio(None))
+    browser.wait(lambda: browser.texts("#taxonomy option"))
+    assert browser.script("return document.getElementById('start').disabled")
+    assert browser.driver.find_element(By.CSS_SELECTOR, "#no-glove a").get_attribute("href").endswith("/glove.html")
+    assert browser.axe() == []
