@@ -33,7 +33,7 @@ class Asked(msgspec.Struct, frozen=True):
     """What a page asks for: `do`, and the values that this takes.
 
     sensors  numbers of sensors        trial, trials  numbers of trials
-    id       of a member of the project    name  a name, or a key
+    id       of a member of the project    name, names  a name, or a key; several
     value    a number                      ids   of several members
     """
 
@@ -43,6 +43,7 @@ class Asked(msgspec.Struct, frozen=True):
     trials: tuple[int, ...] = ()
     id: str = ""
     name: str = ""
+    names: tuple[str, ...] = ()
     value: float | None = None
     ids: tuple[str, ...] = ()
 

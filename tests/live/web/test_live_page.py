@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.keys import Keys
 
 from thenar.runtime.web.server import Server, message
 
