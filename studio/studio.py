@@ -119,8 +119,7 @@ class Studio(Closing):
         about = () if built is None else (built[0], built[1].manifest)
         state = self.project.state
         self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
-        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
-        self.publish("project", message("project", kinds, state=state))
+        self._show_members()
         # Of several changes the last is read: a recording or a build may come while another is read.
         if not self._stale:
             self._stale = True
@@ -147,6 +146,7 @@ class Studio(Closing):
                 if what != "reading":
                     took = round(monotonic() - self._began_s, 1)
                     self.project.remember(took=self.project.state.took | {what: took})
+                    self._show_members()
             except (ThenarError, OSError, BrokenExecutor) as reason:
                 # Parameters are named between backticks, for commands to spell.
                 self.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
@@ -155,6 +155,10 @@ class Studio(Closing):
         """End what uses the glove, and close the pages."""
         self.station.stop()
         self.server.close()
+
+    def _show_members(self) -> None:
+        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
+        self.publish("project", message("project", kinds, state=self.project.state))
 
     def _report(self, what: str, done: int, total: int) -> None:
         """Tell how far the work is, and how long it takes still: as its parts so far, or as the last time, if known.
