@@ -66,7 +66,7 @@ def table(title: str, *columns: str) -> Table:
 
 def loop_costs(scenes: Sequence[Played], folder: Path) -> Table:
     """Return a line per stage: CPU of the thread, median and 99th percentile, of frames in memory."""
-    bounds = f"at most {MOST_US} us with all inputs changing, {REST_US} with a hand at rest"
+    bounds = f"at most {MOST_US} µs with all inputs changing, {REST_US} with a hand at rest"
     made, found = table(f"CPU of the live thread a frame ({bounds})", ""), []
     for scene in scenes:
         moving = restless(len(scene.kept), FRAMES, seed=1)
@@ -74,7 +74,7 @@ def loop_costs(scenes: Sequence[Played], folder: Path) -> Table:
             made.add_column(f"{len(scene.kept)} switches, {what}: median, 99 %", justify="right")
             found.append([np.percentile(spent, (50, 99)) for spent in _stages_us(scene, frames, folder)])
     for what, each in zip(STAGES, zip(*found, strict=True), strict=True):
-        made.add_row(what, *(f"{median:.0f} us, {high:.0f} us" for median, high in each))
+        made.add_row(what, *(f"{median:.0f} µs, {high:.0f} µs" for median, high in each))
     return made
 
 
@@ -145,8 +145,8 @@ def rates(scene: Played, seconds: float, folder: Path) -> Table:
 
 def _rate(found: Found) -> tuple[str, ...]:
     rates_hz = (found.allowed_hz, found.sent_hz, found.arrived_hz, found.run.recognised_hz)
-    cost = f"{found.run.loop_us:.0f} us, {found.run.process_us:.0f} us"
-    split = f"{found.run.between_us:.0f} us a scan: {found.own_share:.0%}" if found.run.between_us else ""
+    cost = f"{found.run.loop_us:.0f} µs, {found.run.process_us:.0f} µs"
+    split = f"{found.run.between_us:.0f} µs a scan: {found.own_share:.0%}" if found.run.between_us else ""
     return found.what, *(f"{hz:.0f}" for hz in rates_hz), f"{found.share:.0%}", cost, split
 
 
@@ -179,7 +179,7 @@ def main() -> None:
         (folder / "few").mkdir()
         way_us, loop_us = row_us(played("quick", folder / "few", prune=60), folder)
         console.print(
-            f"A row of {COLUMNS} columns by UDP, from its datagram to a grasp: {way_us + loop_us:.0f} us (at most "
+            f"A row of {COLUMNS} columns by UDP, from its datagram to a grasp: {way_us + loop_us:.0f} µs (at most "
             f"{ROW_US}), of which {loop_us:.0f} are the live thread's\n"
         )
         console.print(rates(scenes[0], options.seconds, folder), "")

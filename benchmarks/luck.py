@@ -128,7 +128,7 @@ def main() -> None:
     kinds: tuple[By, ...] = ("new subject", "pooled")
     for by in kinds:
         found = cases(range(1, CASES + 1), by, -1)
-        print(f"{by}, the best within {BUDGET_US:g} us: {summary(found)}")
+        print(f"{by}, the best within {BUDGET_US:g} µs: {summary(found)}")
 
 
 if __name__ == "__main__":

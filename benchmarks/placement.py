@@ -40,7 +40,7 @@ def papers_prune(grasp_set: GraspSet) -> int:
 def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
     """Return the table of smallest placements within half a point of the paper's accuracy."""
     title = f"{kind(joints)}: fewest switches within {100 * WITHIN:g} points of the paper's"
-    times = ("scan, new glove, us", "less", "as wired, us", "less")
+    times = ("scan, new glove, µs", "less", "as wired, µs", "less")
     table = Table("method", "switches", "accuracy, %", "fewer switches", *times, title=title)
     cells = (f"{paper.size:.1f}", f"{100 * paper.rate:.2f}", "", f"{paper.new_us:.0f}", "", f"{paper.wired_us:.0f}", "")
     table.add_row("the paper's pruned ID3", *cells, end_section=True)

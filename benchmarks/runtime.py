@@ -95,22 +95,22 @@ def main() -> None:
     whole = call_seconds(lambda: build.recognise(bits, codes), 10_000)
     print(f"\none frame, {len(kept)} switches + {len(codes)} joints, {len(build.grasps)} grasp types, 100 rounds")
     scored = call_seconds(lambda: build.scorer.biased_scores(bits, codes), 20_000)
-    print(f"Build.classify          {ours * MICRO:8.2f} us   of which scores {scored * MICRO:.2f}, the rest rejection")
-    print(f"Build.recognise         {whole * MICRO:8.2f} us   with probability and margin")
+    print(f"Build.classify          {ours * MICRO:8.2f} µs   of which scores {scored * MICRO:.2f}, the rest rejection")
+    print(f"Build.recognise         {whole * MICRO:8.2f} µs   with probability and margin")
 
     X = np.hstack([recorded.switches[:, kept], recorded.codes]).astype(np.float32)
     weights, bias = np.random.default_rng(1).random((len(build.grasps), X.shape[1])), np.zeros(len(build.grasps))
     linear_s = call_seconds(lambda: (weights @ X[0] + bias).argmax(), 20_000)
-    print(f"numpy, a linear model   {linear_s * MICRO:8.2f} us   {linear_s / ours:.2f} times Build.classify")
+    print(f"numpy, a linear model   {linear_s * MICRO:8.2f} µs   {linear_s / ours:.2f} times Build.classify")
     model = GradientBoostingClassifier(n_estimators=100, max_depth=1).fit(X, recorded.grasps)
     sklearn_s = call_seconds(lambda: model.predict(X[:1]), 200)
-    print(f"scikit-learn predict    {sklearn_s * MICRO:8.2f} us   {sklearn_s / ours:.0f} times Build.classify")
+    print(f"scikit-learn predict    {sklearn_s * MICRO:8.2f} µs   {sklearn_s / ours:.0f} times Build.classify")
     onnx = onnx_call(model, X[:1])
     if onnx is None:
         print("onnxruntime             not installed (pip install onnxruntime skl2onnx)")
     else:
         onnx_s = call_seconds(onnx, 2_000)
-        print(f"onnxruntime             {onnx_s * MICRO:8.2f} us   {onnx_s / ours:.1f} times Build.classify")
+        print(f"onnxruntime             {onnx_s * MICRO:8.2f} µs   {onnx_s / ours:.1f} times Build.classify")
 
 
 if __name__ == "__main__":

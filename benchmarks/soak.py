@@ -160,7 +160,7 @@ def soak(folder: Path, minutes: float) -> list[str]:
             samples.append(now := sampled(run.pid, reader, every_s))
             print(
                 f"{number * every_s / MINUTE_S:7.1f} min  {now.rss_kib / 1024:6.1f} MiB  {now.threads} threads"
-                f"  {now.files} files  {now.lines / every_s:5.0f} grasps/s  {now.us:4.0f} us of CPU a grasp",
+                f"  {now.files} files  {now.lines / every_s:5.0f} grasps/s  {now.us:4.0f} µs of CPU a grasp",
                 flush=True,
             )
     return grown(samples)

@@ -118,7 +118,7 @@ def main() -> None:
     console = Console(width=180)
     busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"
     console.print(f"{platform.machine()}, Python {platform.python_version()}; {busy}\n")
-    table = Table(title=f"A frame of a run that shows itself (at most {MOST_US} us more of the run's thread)")
+    table = Table(title=f"A frame of a run that shows itself (at most {MOST_US} µs more of the run's thread)")
     for name in ("", "run's thread: median, 99 %", "more", "frame to grasp: median, 99 %", "server", "frames/s shown"):
         table.add_column(name, justify="right" if table.columns else "left")
     with TemporaryDirectory() as name:
@@ -153,9 +153,9 @@ def compared(
             own, wall = (np.percentile(each[WARM:], (50, 99)) for each in (case.thread_us, case.wall_us))
             yield (
                 case.what,
-                f"{own[0]:.0f} us, {own[1]:.0f} us",
-                "" if case is plain else f"{own[0] - before:+.1f} us",
-                f"{wall[0]:.0f} us, {wall[1]:.0f} us",
+                f"{own[0]:.0f} µs, {own[1]:.0f} µs",
+                "" if case is plain else f"{own[0] - before:+.1f} µs",
+                f"{wall[0]:.0f} µs, {wall[1]:.0f} µs",
                 "" if case is plain else f"{share:.1%}",
                 found[0] if found and case is shown else "",
             )

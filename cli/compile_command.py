@@ -117,9 +117,9 @@ def command(
     """Choose the switches of SET.grasps, train on them, and write the build: integer tables and their verification.
 
     The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, the switch positions in
-    hand.json, and with --glove scan.json. report.html shows all of it in a browser; spec/ describes the reduced glove
-    to cut, solder and run; in try.html you close switches and bend joints in a browser and see the prediction. The same
-    recordings, options, wiring and layout give the same bytes.
+    hand.json, and with --glove scan.json. report.html shows all of it in a browser, where you also close switches and
+    bend joints and see the prediction; spec/ describes the reduced glove to cut, solder and run. The same recordings,
+    options, wiring and layout give the same bytes.
 
     \b
     Example:

@@ -140,7 +140,7 @@ def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[CheckRe
 
 
 def _print(found: "Sequence[CheckResult]") -> None:
-    numbers = ("predicted us", "measured us")
+    numbers = ("predicted µs", "measured µs")
     devices = table(("device", "part", "there", *numbers), numbers, "Devices")
     for one in found:
         measured = "" if one.measured_us is None else f"{one.measured_us:.0f}"

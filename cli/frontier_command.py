@@ -53,8 +53,8 @@ def _timed() -> tuple[str, ...]:
 @click.option(
     "--budget-us",
     type=Number(min=0, min_open=True),
-    help="Pick the most accurate point within this frame time. A CyberGlove takes 260 us plus 337 us for "
-    "each sensor read, 6,323 us for 18: a small budget excludes its joints.",
+    help="Pick the most accurate point within this frame time. A CyberGlove takes 260 µs plus 337 µs for "
+    "each sensor read, 6,323 µs for 18: a small budget excludes its joints.",
 )
 @click.option(
     "--rate", type=Number(0, 1, min_open=True), help="Pick the fastest point of at least this accuracy, 0 to 1."

@@ -25,7 +25,7 @@ from .printing import echo
 GROUPS = {
     "Data": ("import", "simulate", "info", "draw", "merge", "split", "export"),
     "Choose and measure": ("place", "studio", "evaluate", "frontier", "stability"),
-    "Build": ("compile", "adapt", "verify", "spec", "firmware"),
+    "Build": ("compile", "adapt", "compare", "verify", "spec", "firmware"),
     "Live": ("doctor", "calibrate", "record", "wear", "run", "monitor", "segment", "teach", "emulate", "service"),
 }
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)
@@ -95,22 +95,12 @@ def run_group(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         raise
     except BaseException as fault:
-        if _is_broken_pipe(fault):
+        # The reader of standard output has gone, such as `head`: click wraps the streams, in a class that was renamed.
+        if isinstance(fault, SystemExit) and type(sys.stdout).__name__.endswith("PacifyFlushWrapper"):
             return 1
         echo(f"thenar: {_sentence(fault, arguments)}", err=True)
         return 2
     return code if isinstance(code, int) else 0
-
-
-def _is_broken_pipe(fault: BaseException) -> bool:
-    """Return whether this is how click ends when the reader of standard output has gone, such as `head`."""
-    # click wraps the streams then, in a class that was renamed.
-    return isinstance(fault, SystemExit) and type(sys.stdout).__name__.endswith("PacifyFlushWrapper")
-
-
-def with_options(sentence: str) -> str:
-    """Return a sentence of the library with its parameters, ``have``, as the options of commands."""
-    return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", sentence)
 
 
 def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:
@@ -119,7 +109,8 @@ def _sentence(fault: BaseException, arguments: Sequence[str]) -> str:
         case click.ClickException():
             return fault.format_message()
         case ThenarError() | BrokenExecutor():
-            return with_options(str(fault))
+            # Parameters of the library, ``have``, are options of commands.
+            return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", str(fault))
         case OSError():
             reason = fault.strerror or str(fault)
             return f"{fault.filename}: {reason}" if fault.filename else reason

@@ -12,7 +12,7 @@ from .parameters import existing_file
 from .printing import echo, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
-    from thenar.compiler.recordings.summary import JointRange, Summary
+    from thenar.compiler.recordings.summary import Summary
 
 
 @click.command("info")
@@ -59,11 +59,10 @@ def _print(summary: "Summary", path: Path) -> None:
     for kind, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
         if ranges:
             numbers = ("least", "largest", "distinct codes")
-            out().print(table((kind, "unit", *numbers), numbers, f"{kind.capitalize()}s", map(_range, ranges)))
+            grid = table((kind, "unit", *numbers), numbers, f"{kind.capitalize()}s")
+            for line in ranges:
+                ends = ("-" if end is None else f"{end:g}" for end in (line.least, line.largest))
+                grid.add_row(line.name, line.unit, *ends, str(line.codes))
+            out().print(grid)
     for warning in summary.warnings:
         echo(f"warning: {warning.message}")
-
-
-def _range(line: "JointRange") -> tuple[str, ...]:
-    ends = ("-" if end is None else f"{end:g}" for end in (line.least, line.largest))
-    return (line.name, line.unit, *ends, str(line.codes))

@@ -11,26 +11,46 @@ from .printing import say
 @click.command("monitor")
 @click.argument("recording", metavar="RECORDING.mcap", type=existing_file)
 @click.option(
-    "-b", "--build", metavar="BUILD", type=existing_folder, required=True, help="The build to score the recording with."
+    "-b",
+    "--build",
+    "builds",
+    metavar="BUILD",
+    type=existing_folder,
+    required=True,
+    multiple=True,
+    help="The build to score the recording with. Twice: to compare two builds on the same frames.",
 )
 @click.option("--web", metavar="ADDRESS", default=WEB_ADDRESS, show_default=True, help="Address of the page.")
 @web_token_option
-def command(recording: Path, build: Path, web: str, web_token: str | None) -> None:
+def command(recording: Path, builds: tuple[Path, ...], web: str, web_token: str | None) -> None:
     """Show a recording on a page in the browser.
 
-    The page jumps to any moment, plays from there, and shows the labels next to the predictions, the hand at that
-    moment, and the other types' probabilities.
+    A timeline shows the labels, the predictions, and where they differ. The page goes to any moment, plays from there,
+    and shows the hand at that moment and the other types' probabilities.
 
     SIGINT, SIGTERM and SIGHUP end it, with exit code 0.
 
     \b
     Example:
         thenar monitor run.mcap --build build/
+        thenar monitor run.mcap --build build/ --build adapted/
     """
-    from thenar.runtime.web.replay import ReplayPage
+    if len(builds) > 2:
+        raise click.UsageError("a page shows two builds at most: leave out a --build")
+    from thenar.runtime.web.live import shell_message
+    from thenar.runtime.web.replay import Replay
+    from thenar.runtime.web.server import Server
 
     from . import ended_by_signals
 
-    with ended_by_signals() as stop, ReplayPage(recording, web, token=web_token, build=build) as page:
-        say(f"thenar: the page is at {page.server.url}")
-        page.run(stop)
+    with (
+        ended_by_signals() as stop,
+        Replay(recording, builds) as replay,
+        Server(
+            "live", web, token=web_token, on_message=lambda asked: replay.reply(asked["do"], asked.get("numbers"))
+        ) as server,
+    ):
+        server.publish("shell", shell_message(recording.name, builds[0], replay.manifest))
+        server.publish("replay", replay.about)
+        say(f"thenar: the page is at {server.url}")
+        stop.wait()

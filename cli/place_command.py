@@ -104,7 +104,10 @@ def command(
     keep_apart(grasps, glove, layout, prices, draw, output)
     asked = {name for name in context.params if context.get_parameter_source(name) is ParameterSource.COMMANDLINE}
     if not asked & _OF_METHODS:
-        _check_sensors(glove, layout, draw)
+        if glove is not None:
+            raise click.UsageError("--glove gives scan costs, and sensors are chosen without: leave it out")
+        if layout is not None and draw is None:
+            raise click.UsageError("--layout gives positions for --draw, or for --apart-mm with a --method: add that")
         _place_sensors(GraspSet.load(grasps), recipe, drop, instead_of, layout, prices, jobs, draw, output)
         return
     if drop or instead_of:
@@ -122,14 +125,6 @@ def command(
     if show_tree and placement.tree is not None:
         echo(placement.tree.text(placement.all_names, placement.grasps))
     _print(placement)
-
-
-def _check_sensors(glove: Path | None, layout: Path | None, draw: Path | None) -> None:
-    """Raise UsageError for files that the choice of sensors does not use."""
-    if glove is not None:
-        raise click.UsageError("--glove gives scan costs, and sensors are chosen without: leave it out")
-    if layout is not None and draw is None:
-        raise click.UsageError("--layout gives positions for --draw, or for --apart-mm with a --method: add that")
 
 
 def _place_sensors(

@@ -12,7 +12,7 @@ from .printing import echo, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.verify import FaultCheck, Verification
-    from thenar.compiler.artifact.verify_firmware import Difference, FirmwareVerification, TargetCheck
+    from thenar.compiler.artifact.verify_firmware import FirmwareVerification, TargetCheck
     from thenar.compiler.model.compare import WorstCase
 
 _SHOWN = 20
@@ -143,8 +143,10 @@ def print_firmware(found: "FirmwareVerification") -> None:
         echo(f"  {check.part}{', inputs missing' if check.missing else ''}: {_outcome(check)}")
         if check.misnamed:
             echo(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
-        if check.first is not None:
-            _print_difference(check.first)
+        if (first := check.first) is not None:
+            said = zip((first.grasp, first.compiled_grasp), (first.scores, first.compiled_scores), strict=True)
+            python, compiled = (f"{grasp}, scores {' '.join(map(str, scores))}" for grasp, scores in said)
+            echo(f"    {first.frame}: Python {python}; compiled {compiled}; --json has the frame")
     if found.outdated is None:
         echo("  the build carries no firmware")
     elif found.outdated:
@@ -163,15 +165,3 @@ def _outcome(check: "TargetCheck") -> str:
     if check.states:
         what = "score, grasp type, margin, probability and state of a segment"
     return f"every {what} of {check.frames} frames matches Python's{counted}{stack}"
-
-
-def _print_difference(first: "Difference") -> None:
-    codes = " ".join(map(str, first.codes)) or "none"
-    echo(f"    {first.frame}: closed {', '.join(first.closed) or 'none'}; codes {codes}")
-    for who, grasp, scores, said in (
-        ("Python", first.grasp, first.scores, first.said),
-        ("compiled", first.compiled_grasp, first.compiled_scores, first.compiled_said),
-    ):
-        more = f", margin {said[0]}, probability {said[1]} of 65535" if said else ""
-        more += f", segment state {said[2]}" if len(said) > 2 else ""
-        echo(f"    {who}: {grasp}, scores {' '.join(map(str, scores))}{more}")

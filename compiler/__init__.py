@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from .artifact import CompileError
     from .artifact.adapting import AdaptedBuild, adapt
+    from .artifact.comparing import BuildComparison, compare_builds
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
     from .artifact.exporting import export_c
@@ -53,6 +54,7 @@ _HOMES = {
     "thenar.runtime.model.terms.line": ("Line",),
     "thenar.runtime.recipe": ("Recipe",),
     ".artifact.adapting": ("AdaptedBuild", "adapt"),
+    ".artifact.comparing": ("BuildComparison", "compare_builds"),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
@@ -85,6 +87,7 @@ __all__ = [
     "Bins",
     "Bit",
     "Build",
+    "BuildComparison",
     "BuildReport",
     "ColumnRoles",
     "CompileError",
@@ -111,6 +114,7 @@ __all__ = [
     "TrainingError",
     "Verification",
     "adapt",
+    "compare_builds",
     "compile_build",
     "evaluate",
     "export_c",

@@ -16,7 +16,9 @@ from thenar.runtime.scanning.timing import glove_us, scan_us
 from .glove.propose import propose_cyberglove
 from .text import INDEPENDENT, counted, listed, microseconds, percent
 
-Topic = Literal["kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "faults", "scan", "wiring"]
+Topic = Literal[
+    "kept", "inputs", "fit", "compared", "accuracy", "caution", "integers", "firmware", "faults", "scan", "wiring"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,7 @@ def facts(
         *_accuracy(manifest),
         *_cautions(manifest, harness),
         _integers(manifest),
-        *([Fact("kept", "firmware", firmware)] if firmware else []),
+        *([Fact("firmware", "firmware", firmware)] if firmware else []),
         *(
             Fact("faults", "at worst, on training rows", sentence)
             for sentence in (() if manifest.faults is None else manifest.faults.sentences)
@@ -167,14 +169,14 @@ def _scan(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> 
             yield Fact(
                 "scan",
                 "a whole scan",
-                f"{counted(len(scan.ports) + time.selects, 'transaction')}{muxes}, {time.us:.1f} us on the wire, "
-                f"{percent(time.share)} of the {time.full_us:.1f} us for all {harness.on_chips} wired "
+                f"{counted(len(scan.ports) + time.selects, 'transaction')}{muxes}, {time.us:.1f} µs on the wire, "
+                f"{percent(time.share)} of the {time.full_us:.1f} µs for all {harness.on_chips} wired "
                 f"{'sensors' if harness.taxel_names else 'switches'}",
             )
         for stream, read in zip(harness.streams, scan.streams, strict=True):
             switches = counted(len(read.switches), "kept switch", "kept switches")
             levels = f" and {counted(len(read.levels), 'level')} of taxels" if read.levels else ""
-            yield Fact("scan", f"stream {stream.port}", f"{switches}{levels}, a row every {stream.period_us} us")
+            yield Fact("scan", f"stream {stream.port}", f"{switches}{levels}, a row every {stream.period_us} µs")
     names = [joint.name for joint in manifest.joints]
     glove = propose_cyberglove(names) if harness is None else harness.cyberglove
     if names and glove is not None:
@@ -182,7 +184,7 @@ def _scan(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> 
         yield Fact(
             "scan",
             "CyberGlove",
-            f"a record of {counted(len(names), 'sensor')} takes {us} us at best, by the vendor's formula",
+            f"a record of {counted(len(names), 'sensor')} takes {us} µs at best, by the vendor's formula",
         )
 
 

@@ -18,11 +18,11 @@ def microseconds(us: float) -> str:
 
 
 def duration(us: float) -> str:
-    """Return a time to three digits, in a suitable unit: "440 us", "2.05 ms", "1.5 s"."""
+    """Return a time to three digits, in a suitable unit: "440 µs", "2.05 ms", "1.5 s"."""
     for unit, size in (("s", 1e6), ("ms", 1e3)):
         if us >= 0.9995 * size:
             return f"{us / size:.3g} {unit}"
-    return f"{us:.3g} us"
+    return f"{us:.3g} µs"
 
 
 def counted(number: int, one: str, many: str = "") -> str:

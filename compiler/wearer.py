@@ -146,12 +146,16 @@ class Adaptation:
         return scores
 
     @property
-    def contradictions(self) -> list[tuple[int, ...]]:
-        """The classes of each frame that has several."""
-        frames = np.column_stack([self.bits, self.codes])
+    def contradictions(self) -> dict[tuple[int, ...], set[int]]:
+        """The classes of each frame that has several, and the trials with such a frame, counted from 0."""
+        frames, trial = np.column_stack([self.bits, self.codes]), np.unique(self.trials, return_inverse=True)[1]
         number = np.unique(frames, axis=0, return_inverse=True)[1].ravel()
-        found = (np.unique(self.labels[number == frame]) for frame in np.flatnonzero(np.bincount(number) > 1))
-        return sorted({tuple(classes.tolist()) for classes in found if len(classes) > 1})
+        found = dict[tuple[int, ...], set[int]]()
+        for frame in np.flatnonzero(np.bincount(number) > 1):
+            classes = tuple(np.unique(self.labels[number == frame]).tolist())
+            if len(classes) > 1:
+                found.setdefault(classes, set()).update(trial[number == frame].tolist())
+        return dict(sorted(found.items()))
 
     def shares(self, kept: NDArray[np.bool_]) -> Floats:
         """Return the mean probabilities of the tables' classes in the `kept` trials of each new one, (k, m)."""

@@ -4,23 +4,28 @@ Every browser has its own choice, so a page sends it whole and gets its own repl
 with nested folds or the curve of what sensors are worth, is queued, and its result is sent to all pages.
 """
 
+import hashlib
 from collections.abc import Sequence
 from functools import partial
 from shlex import quote
 from typing import Any
 
+import msgspec
+import numpy as np
+
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
 from thenar.compiler.glove.propose import propose_harness
-from thenar.compiler.hand import HandShape
+from thenar.compiler.hand import HandShape, moved_by
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.elements import elements_of, names_of
+from thenar.compiler.recordings.edits import TrialId
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.hand import DrawnSwitch, HandDrawing
+from thenar.runtime.hand import DrawnJoint, DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
@@ -39,55 +44,80 @@ class ChoosePage:
     def __init__(self, studio: Studio) -> None:
         self._studio, self._project = studio, studio.project
         self._quick: QuickAccuracy | None = None
+        # The trials as they were recorded, by their numbers on pages, and what pages call this numbering.
+        self.numbered: tuple[list[TrialId], str] = ([], "")
         requests: dict[str, Handler] = {
             "choose": lambda asked: self._reply(asked.sensors),
             "add": lambda asked: self._found("add", asked.sensors),
             "drop": lambda asked: self._found("drop", asked.sensors),
-            "trial": self._trial,
+            "use": self._use,
             **dict.fromkeys(("measure", "curve", "train"), self._later),
         }
         studio.add("choose.html", "Choose", requests, self.read)
 
     def read(self, report: Report) -> None:
-        """Read the project's recordings, and show them. Raises ThenarError if there are none, or a single type."""
-        self._quick = None
+        """Read the project's recordings, and show them; until then pages get those before."""
         try:
-            self._set = grasp_set = self._project.grasp_set()
-            self._quick = quick = QuickAccuracy(grasp_set)
+            grasp_set, trials, unused = self._project.recordings()
+            self._hand = self._project.hand().fitted(grasp_set.element_names)
+            self._parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
+            quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
+            self._quick = None
             self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
             return
-        self._hand = self._project.hand().fitted(grasp_set.element_names)
-        self._parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
+        self._set, self._quick = grasp_set, quick
+        of_rows = [trial for trial, none in zip(trials, grasp_set.is_none.tolist(), strict=True) if not none]
+        ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
+        said = msgspec.json.encode((ids, grasp_set.fingerprint()))
+        self.numbered = ids, hashlib.sha256(said).hexdigest()[:12]
         self._prices = {name: part.price for name, part in self._parts.items()}
         self._levels = self._levels_of()
         kinds = ["switch"] * len(grasp_set.switch_names) + ["pad"] * len(grasp_set.taxel_columns)
         kinds += ["joint"] * len(grasp_set.joints)
         about = {
             "why": "",
-            "name": ", ".join(path.name for path in self._project.sets()),
+            "name": ", ".join(self._files),
+            "unused": unused,
             "grasps": quick.grasps,
-            "trials": quick.trials,
+            "types": self.types,
+            "joints": _joints(quick.held),
+            "trials": _names(ids),
+            "numbering": self.numbered[1],
             "sensors": [
                 {"name": name, "kind": kind, "price": self._prices.get(name)}
                 for name, kind in zip(quick.names, kinds, strict=True)
             ],
         }
-        self._studio.publish("sensors", message("sensors", _drawn(grasp_set, self._hand)))
+        self._studio.publish("sensors", message("sensors", drawn(grasp_set, self._hand)))
         self._studio.publish("set", message("set", about))
 
     @property
-    def _known(self) -> QuickAccuracy:
+    def _files(self) -> list[str]:
+        """The names of the sets that are used."""
+        return list(dict.fromkeys(file for file, *_ in self.numbered[0]))
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """The grasp types that a trial may be of."""
+        return self._set.taxonomy.types
+
+    @property
+    def known(self) -> QuickAccuracy:
+        """The accuracies of the recordings. Raises ThenarError before they are read."""
         if self._quick is None:
             raise ThenarError("the recordings are not read yet")
         return self._quick
 
     def _found(self, do: str, sensors: tuple[int, ...]) -> bytes:
-        find = self._known.best_next if do == "add" else self._known.least
+        find = self.known.best_next if do == "add" else self.known.least
         return message(do, sensor=find(sensors), sensors=sensors)
 
-    def _trial(self, asked: Asked) -> bytes:
-        return message("trial", self._known.trial(asked.trial, asked.sensors), trial=asked.trial)
+    def _use(self, asked: Asked) -> None:
+        """Use a set, or leave it aside. Raises SettingError if there is no such set."""
+        name, aside = self._project.path("set", asked.id).name, {*self._project.state.aside}
+        self._project.remember(aside=tuple(sorted(aside - {name} if asked.value else aside | {name})))
+        self._studio.changed()
 
     def _later(self, asked: Asked) -> None:
         if asked.do != "curve" and not asked.sensors:
@@ -97,14 +127,14 @@ class ChoosePage:
 
     def _names(self, sensors: Sequence[int]) -> tuple[str, ...]:
         """Return the names of sensors, each once, in this order. Raises EvaluationError if there is no such number."""
-        self._known.check(sensors)
-        return tuple(dict.fromkeys(self._known.names[sensor] for sensor in sensors))
+        self.known.check(sensors)
+        return tuple(dict.fromkeys(self.known.names[sensor] for sensor in sensors))
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
         names = self._names(sensors)
         return message(
             "quick",
-            self._known.of(sensors),
+            self.known.of(sensors),
             sensors=sensors,
             scan_us=self._scan_us(names),
             price=sum(self._prices[name] for name in names) if self._prices else None,
@@ -115,12 +145,8 @@ class ChoosePage:
         """Return the commands that compile a build of these sensors."""
         if not names:
             return ""
-        sets, have = [quote(str(path)) for path in self._project.sets()], quote(",".join(names))
-        more = "".join(f" {quote(option)}" for option in self._project.options())
-        first, recordings = "", sets[0]
-        if len(sets) > 1:
-            recordings = quote(str(self._project.folder / "all.grasps"))
-            first = f"thenar merge {' '.join(sets)} -o {recordings} && "
+        first, recordings = self._project.joined([self._project.folder / name for name in self._files])
+        have, more = quote(",".join(names)), "".join(f" {quote(option)}" for option in self._project.options())
         output = quote(str(self._project.new_path(_BUILD)))
         return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
 
@@ -160,7 +186,7 @@ class ChoosePage:
         self._studio.publish(asked.do, message(asked.do, sensors=asked.sensors, **content))
 
     def _content(self, study: SensorStudy) -> dict[str, object]:
-        numbers = {name: number for number, name in enumerate(self._known.names)}
+        numbers = {name: number for number, name in enumerate(self.known.names)}
         return {
             "of": study.of,
             "enough": study.enough,
@@ -176,7 +202,26 @@ class ChoosePage:
         }
 
 
-def _drawn(grasp_set: GraspSet, hand: HandShape | None) -> HandDrawing:
+def _joints(held: GraspSet) -> list[DrawnJoint]:
+    """Return the joints as they are drawn, with their values at their least and their greatest code."""
+    drawn_ones = []
+    for number, joint in enumerate(held.joints):
+        codes = held.codes[:, number]
+        low, high = joint.value([codes.min(), codes.max()]).tolist()
+        drawn_ones.append(DrawnJoint(joint.name, number, joint.unit, low, high, *moved_by(joint.name)))
+    return drawn_ones
+
+
+def _names(trials: Sequence[TrialId]) -> list[str]:
+    """Return short names of trials: "trial 7 of Ana, cup", with the session if there are several."""
+    several = len({session for _, _, session, _, _, _ in trials}) > 1
+    return [
+        f"trial {number} of {subject}, {thing}" + (f", session {session}" if several else "")
+        for _, subject, session, _, thing, number in trials
+    ]
+
+
+def drawn(grasp_set: GraspSet, hand: HandShape | None) -> HandDrawing:
     """Return a drawing in which every switch and pad of a set is one to click on: its number is the sensor's."""
     places, fields = placed(grasp_set.element_names, hand)
     switches = tuple(DrawnSwitch(name, x, y, number) for number, (name, (x, y)) in enumerate(places.items()))

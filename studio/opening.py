@@ -2,10 +2,13 @@
 
 from .choose import ChoosePage
 from .collector import Collector
+from .compare import add_compare_page
+from .errors import ErrorsPage
 from .glove import GlovePage
 from .project import Project
 from .record import RecordPage
 from .studio import Studio
+from .wearer import WearerPage
 
 
 def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose") -> Studio:
@@ -14,6 +17,8 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     collector = Collector(studio)
     GlovePage(studio)
     RecordPage(studio, collector)
-    ChoosePage(studio)
+    ErrorsPage(studio, ChoosePage(studio))
+    WearerPage(studio, collector)
+    add_compare_page(studio)
     studio.changed()
     return studio

@@ -3,11 +3,14 @@
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import join, quote
 
 import msgspec
 
 from thenar.compiler.glove.prices import Part, load_prices
 from thenar.compiler.hand import HandShape, load_layout
+from thenar.compiler.recordings import RecordingError
+from thenar.compiler.recordings.edits import TrialId, apply_edits
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.drivers.errors import SettingError, ThenarError
@@ -16,6 +19,8 @@ from thenar.runtime.files import write_atomically
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import fault, shortened
+
+from .edits import load_edits
 
 _STATE = "studio.json"
 # What each kind of member is called, in a folder.
@@ -31,11 +36,15 @@ class Member(msgspec.Struct, frozen=True):
 
 
 class State(msgspec.Struct, forbid_unknown_fields=True):
-    """What is remembered in studio.json: the name of the build in use, of the wearer, and of the sets left aside."""
+    """What is remembered in studio.json: the name of the build in use, of the one that it was adapted in place of, of
+    the wearer, and of the sets left aside; and the seconds that each kind of work last took.
+    """
 
     build: str = ""
+    former: str = ""
     wearer: str = "me"
     aside: tuple[str, ...] = ()
+    took: dict[str, float] = {}
 
 
 class Project:
@@ -93,11 +102,47 @@ class Project:
         return [self.folder / one.name for one in self.members("set") if one.name not in self.state.aside]
 
     def grasp_set(self) -> GraspSet:
-        """Return the recordings: all sets in use as one. Raises ThenarError if there is none, or they do not fit."""
-        sets = {path.name: GraspSet.load(path) for path in self.sets()}
+        """Return the recordings: all sets in use as one, with their edits. Raises ThenarError if there is none."""
+        return self.recordings()[0]
+
+    def recordings(self, paths: Sequence[Path] = ()) -> tuple[GraspSet, list[TrialId], list[str]]:
+        """Return the recordings, these sets or all in use, for each of their rows the trial as it was recorded, and a
+        sentence on each set that does not fit and on each edit that is not used.
+
+        Raises ThenarError if there is no set, or the log of edits is damaged before its last line.
+        """
+        loaded, unused = dict[str, GraspSet](), list[str]()
+        for path in paths or self.sets():
+            try:
+                loaded[path.name] = GraspSet.load(path)
+            except ThenarError as reason:
+                unused.append(f"{path.name} is left aside: {reason}")
+        sets, misfits = _fitting(loaded)
+        unused += misfits
         if not sets:
-            raise SettingError("the project has no recordings yet: record some, or import a table with thenar import")
-        return next(iter(sets.values())) if len(sets) == 1 else merge(sets)
+            none = "the project has no recordings yet: record some, or import a table with thenar import"
+            raise SettingError("; ".join(unused) or none)
+        edits, damaged = load_edits(self.edits)
+        # Those of sets that were left aside wait.
+        aside = {one.name for one in self.members("set")} - sets.keys()
+        grasp_set, trials, missing = apply_edits(sets, [edit for edit in edits if edit.set not in aside])
+        return grasp_set, trials, [*unused, *missing, *filter(None, [damaged])]
+
+    @property
+    def edits(self) -> Path:
+        """The path of the log of edits, which may not be there."""
+        return self.folder / "edits.jsonl"
+
+    def joined(self, paths: Sequence[Path]) -> tuple[str, str]:
+        """Return the beginning of a command that makes one set of several and of edits, and the name of the result; if
+        there is nothing to do, "" and the name of the only set.
+        """
+        if len(paths) == 1 and not self.edits.exists():
+            return "", quote(str(paths[0]))
+        # Beside the project, of which it would be one more set.
+        whole = str(self.folder.resolve().parent / f"{self.name}.grasps")
+        edits = ["--edits", str(self.edits)] if self.edits.exists() else []
+        return f"{join(['thenar', 'merge', *map(str, paths), *edits, '-o', whole])} && ", quote(whole)
 
     @property
     def harness(self) -> Path:
@@ -142,6 +187,22 @@ class Project:
             if not any((self.folder / f"{stem}{end}").exists() for end in (ending, *others)):
                 return self.folder / f"{stem}{ending}"
         raise ThenarError(f"{self.folder} has too many files called {name}")
+
+
+def _fitting(sets: dict[str, GraspSet]) -> tuple[dict[str, GraspSet], list[str]]:
+    """Return the sets of which each fits those before it, and a sentence on each other."""
+    try:
+        merge(sets)
+        return sets, []
+    except RecordingError:
+        fitting, misfits = dict[str, GraspSet](), list[str]()
+    for name, one in sets.items():
+        try:
+            merge({**fitting, name: one})
+            fitting[name] = one
+        except RecordingError as reason:
+            misfits.append(f"{name} is left aside: {reason}")
+    return fitting, misfits
 
 
 def _id(name: str) -> str:

@@ -30,19 +30,9 @@ _DECISIVE = 3
 _MOST_TRIED = 4000
 
 
-class Misread(msgspec.Struct, frozen=True):
-    """A trial that was recognised as another type: its number in `trials`, and the two types."""
-
-    trial: int
-    truth: str
-    read: str
-
-
 class Quick(msgspec.Struct, frozen=True):
     """The result for some sensors: the accuracy of trials, 0..1, and its 95 % interval, and what it is of; how many
-    trials of each type (rows) were read as each (columns); and those that were misread.
-
-    map  for every trial its type's number, and its place on the two axes on which the types are furthest apart
+    trials of each type (rows) were recognised as each (columns); and the number of the recognised type of every trial.
     """
 
     of: str
@@ -50,20 +40,7 @@ class Quick(msgspec.Struct, frozen=True):
     low: float
     high: float
     confusion: tuple[tuple[int, ...], ...]
-    misread: tuple[Misread, ...]
-    map: tuple[tuple[int, float, float], ...]
-
-
-class SeenTrial(msgspec.Struct, frozen=True):
-    """A trial: what each sensor showed in it, 0 to 1 of its range in the set, and typically in trials of the true and
-    of the recognised type; the numbers of these types; and the sensors that decided for the wrong one, most first.
-    """
-
-    shown: tuple[float, ...]
-    truth: int
-    read: int
-    typical: tuple[tuple[float, ...], ...]
-    decisive: tuple[int, ...]
+    read: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,8 +67,14 @@ class QuickAccuracy:
         The names of the sensors, by number: switches, pads, joints.
     grasps : tuple of str
         The grasp types.
-    trials : tuple of str
-        The trials in which something is held, in words: "trial 7 of Ana, cup", as the recordings number them.
+    held : GraspSet
+        The rows in which something is held.
+    trial : (n,) array of intp
+        For each of these rows the number of its trial.
+    truth : (T,) array of intp
+        The number of each trial's type.
+    typical : list of (d,) array
+        For each type what the sensors showed on average, 0 to 1 of their ranges in the set.
 
     Raises
     ------
@@ -108,33 +91,28 @@ class QuickAccuracy:
         rows = self._samples
         self._inputs = np.concatenate([rows.switches.T, lines(rows.taxels), lines(rows.codes)]).T
         self._folds = [self._summed(fold.train, fold.test) for fold in self._cut.folds]
-        self.trials = tuple(
-            f"trial {held.trials[row]} of {held.subjects[row]}, {held.objects[row]}"
-            for row in np.unique(rows.trials, return_index=True)[1].tolist()
-        )
+        self.held = held
+        _, first, self.trial = np.unique(rows.trials, return_index=True, return_inverse=True)
+        self.truth = rows.labels[first]
         every = np.arange(len(rows.labels))
         self._every = self._summed(every, every)
+        self.typical = [self._of_range(means) for means in self._every.means]
 
     def of(self, sensors: Sequence[int]) -> Quick:
         """Return the accuracy of sensors by their numbers. Raises EvaluationError if there is no such number."""
         columns = self._columns(sensors)
         rows, predicted = self._samples, self._all_predicted(columns)
         rate = Rate.predicted(predicted, rows.labels, rows.trials, of=self._cut.of, groups=self._cut.groups)
-        _, first, trial = np.unique(rows.trials, return_index=True, return_inverse=True)
-        read, truth = decided(predicted[np.newaxis], trial)[0], rows.labels[first]
+        read = decided(predicted[np.newaxis], self.trial)[0]
         confusion = np.zeros((len(self.grasps), len(self.grasps)), np.intp)
-        np.add.at(confusion, (truth, read), 1)
-        wrong = np.flatnonzero(read != truth).tolist()
+        np.add.at(confusion, (self.truth, read), 1)
         return Quick(
             of=str(self._cut.of),
             mean=rate.mean,
             low=rate.low,
             high=rate.high,
             confusion=tuple(map(tuple, confusion.tolist())),
-            misread=tuple(Misread(one, self.grasps[truth[one]], self.grasps[read[one]]) for one in wrong),
-            map=tuple(
-                (int(kind), x, y) for kind, (x, y) in zip(truth, self._places(columns, trial).tolist(), strict=True)
-            ),
+            read=tuple(read.tolist()),
         )
 
     def best_next(self, sensors: Sequence[int]) -> int | None:
@@ -154,37 +132,39 @@ class QuickAccuracy:
         self.check(sensors)
         return max(sensors, key=lambda one: self._right([other for other in sensors if other != one]), default=None)
 
-    def trial(self, number: int, sensors: Sequence[int]) -> SeenTrial:
-        """Return a trial as it was seen, and as these sensors read it.
+    def rows_of(self, trial: int) -> NDArray[np.intp]:
+        """Return the rows of a trial. Raises EvaluationError if there is no such trial."""
+        if not 0 <= trial < len(self.truth):
+            raise EvaluationError(f"there are {len(self.truth)} trials, numbered from 0")
+        return np.flatnonzero(self.trial == trial)
+
+    def seen(self, trial: int) -> Floats:
+        """Return what each sensor (d,) showed in a trial on average, 0 to 1 of its range in the set.
+
+        Raises EvaluationError if there is no such trial.
+        """
+        return self._of_range(self._inputs[self.rows_of(trial)].mean(axis=0))
+
+    def decisive(self, trial: int, sensors: Sequence[int]) -> list[int]:
+        """Return which of these sensors decided for the wrong type of a misread trial, the strongest first; at most 3.
 
         Raises EvaluationError if there is no such trial or sensor.
         """
-        columns, rows = self._columns(sensors), self._samples
-        trials = np.unique(rows.trials)
-        if not 0 <= number < len(trials):
-            raise EvaluationError(f"there are {len(trials)} trials, numbered from 0")
-        own = np.flatnonzero(rows.trials == trials[number])
-        truth = int(rows.labels[own[0]])
+        columns, own = self._columns(sensors), self.rows_of(trial)
+        truth = self.truth[trial]
         fold = next(fold for fold in self._folds if own[0] in fold.test)
-        predicted = self._predicted(fold, columns, own)
-        read = int(decided(predicted[np.newaxis], np.zeros(len(own), np.intp))[0, 0])
-        inputs, decisive = self._inputs[own].mean(axis=0), list[int]()
-        if columns and read != truth:
-            means, weights = fold.means[:, columns], self._weights(fold, columns)
-            middle = 0.5 * (means[read] + means[truth])
-            shares = (weights[:, read] - weights[:, truth]) * (inputs[columns] - middle)
-            decisive = [columns[place] for place in np.argsort(-shares, kind="stable")[:_DECISIVE] if shares[place] > 0]
-        return SeenTrial(
-            shown=self._of_range(inputs),
-            truth=truth,
-            read=read,
-            typical=tuple(self._of_range(self._every.means[one]) for one in (truth, read)),
-            decisive=tuple(decisive),
-        )
+        read = int(decided(self._predicted(fold, columns, own)[np.newaxis], np.zeros(len(own), np.intp))[0, 0])
+        if not columns or read == truth:
+            return []
+        means, weights = fold.means[:, columns], self._weights(fold, columns)
+        middle = 0.5 * (means[read] + means[truth])
+        shares = (weights[:, read] - weights[:, truth]) * (self._inputs[own][:, columns].mean(axis=0) - middle)
+        return [columns[place] for place in strongest(shares)]
 
-    def _of_range(self, inputs: Floats) -> tuple[float, ...]:
+    def _of_range(self, inputs: Floats) -> Floats:
         low, high = self._inputs.min(axis=0), self._inputs.max(axis=0)
-        return tuple(((inputs - low) / np.maximum(high - low, 1e-9)).round(3).tolist())
+        shares: Floats = ((inputs - low) / np.maximum(high - low, 1e-9)).round(3)
+        return shares
 
     def check(self, sensors: Sequence[int]) -> None:
         """Raise EvaluationError unless there are sensors with these numbers."""
@@ -206,9 +186,13 @@ class QuickAccuracy:
             shares = np.log(counts / counts.sum())
         return _Sums(test, means, inside.T @ inside / len(train), shares)
 
-    def _places(self, columns: list[int], trial: NDArray[np.intp]) -> Floats:
-        """Return where each trial (m,) lies on the first two axes (m, 2) of a discriminant of all rows."""
-        places = np.zeros((trial.max() + 1, 2))
+    def places(self, sensors: Sequence[int]) -> Floats:
+        """Return where each trial (T, 2) lies on the two axes on which these sensors show the types furthest apart.
+
+        They are the first axes of a discriminant of all rows. Raises EvaluationError if there is no such sensor.
+        """
+        columns, trial = self._columns(sensors), self.trial
+        places = np.zeros((len(self.truth), 2))
         if not columns:
             return places
         inputs = self._inputs[:, columns]
@@ -244,6 +228,11 @@ class QuickAccuracy:
         scores = self._inputs[rows[:, np.newaxis], columns] @ weights + offsets
         best: NDArray[np.intp] = scores.argmax(axis=1)
         return best
+
+
+def strongest(shares: Floats) -> list[int]:
+    """Return the places of the largest positive shares, at most 3."""
+    return [place for place in np.argsort(-shares, kind="stable").tolist()[:_DECISIVE] if shares[place] > 0]
 
 
 def _shrunk(scatter: Floats) -> Floats:

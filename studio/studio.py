@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
+from time import monotonic
 
 import msgspec
 
@@ -31,17 +32,19 @@ Report = Callable[[int, int], None]
 class Asked(msgspec.Struct, frozen=True):
     """What a page asks for: `do`, and the values that this takes.
 
-    sensors  numbers of sensors        trial  the number of a trial
+    sensors  numbers of sensors        trial, trials  numbers of trials
     id       of a member of the project    name  a name, or a key
-    value    a number
+    value    a number                      ids   of several members
     """
 
     do: str
     sensors: tuple[int, ...] = ()
     trial: int = 0
+    trials: tuple[int, ...] = ()
     id: str = ""
     name: str = ""
     value: float | None = None
+    ids: tuple[str, ...] = ()
 
 
 Handler = Callable[[Asked], bytes | None]
@@ -76,11 +79,12 @@ class Studio(Closing):
         self, project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose"
     ) -> None:
         self.project, self.jobs = project, jobs
-        self._requests: dict[str, Handler] = {}
+        self._requests: dict[str, Handler] = {"cancel": self._cancel}
         self._titles = list[tuple[str, str]]()
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
         self._stale = False
+        self._began_s, self._cancelled = 0.0, False
         self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
 
@@ -114,8 +118,7 @@ class Studio(Closing):
         about = () if built is None else (built[0], built[1].manifest)
         state = self.project.state
         self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
-        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
-        self.publish("project", message("project", kinds, state=state))
+        self._show_members()
         # Of several changes the last is read: a recording or a build may come while another is read.
         if not self._stale:
             self._stale = True
@@ -134,10 +137,15 @@ class Studio(Closing):
             except Empty:
                 continue
             report = partial(self._report, what)
-            report(0, 1)
+            self._began_s, self._cancelled = monotonic(), False
             try:
+                report(0, 1)
                 work(report)
-                report(1, 1)
+                self.publish("work", message("work", done=1, total=1, what=what))
+                if what != "reading":
+                    took = round(monotonic() - self._began_s, 1)
+                    self.project.remember(took=self.project.state.took | {what: took})
+                    self._show_members()
             except (ThenarError, OSError, BrokenExecutor) as reason:
                 # Parameters are named between backticks, for commands to spell.
                 self.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
@@ -147,8 +155,24 @@ class Studio(Closing):
         self.station.stop()
         self.server.close()
 
+    def _show_members(self) -> None:
+        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
+        self.publish("project", message("project", kinds, state=self.project.state))
+
     def _report(self, what: str, done: int, total: int) -> None:
-        self.publish("work", message("work", done=done, total=total, what=what))
+        """Tell how far the work is, and how long it takes still: as its parts so far, or as the last time, if known.
+
+        Raises ThenarError if it was cancelled.
+        """
+        if self._cancelled:
+            raise ThenarError("cancelled")
+        spent, last = monotonic() - self._began_s, self.project.state.took.get(what)
+        left = spent / done * (total - done) if done else None if last is None else max(last - spent, 0.0)
+        self.publish("work", message("work", done=done, total=total, what=what, left_s=left))
+
+    def _cancel(self, _: Asked) -> None:
+        """End the work at its next report."""
+        self._cancelled = True
 
     def _take(self, fields: Mapping[str, object]) -> bytes | None:
         """Carry out a request. Raises ThenarError if it cannot be met."""

@@ -20,12 +20,13 @@ class Browser:
     def __init__(self, driver: webdriver.Chrome) -> None:
         self.driver = driver
 
-    def open_file(self, path: Path) -> None:
+    def open_file(self, path: Path, fragment: str = "") -> None:
         """Open a page that is a file, in light colours; what was asked for and complained of before is forgotten."""
+        self.driver.get("about:blank")  # the same address with another fragment would not load the file again
         self.log("performance")
         self.log("browser")
         self.scheme("light")
-        self.driver.get(path.as_uri())
+        self.driver.get(path.as_uri() + fragment)
 
     def open(self, url: str, *, width: int = 1400, scheme: str = "light") -> None:
         """Open a page, in a window so wide, of a reader whose system is light or dark."""

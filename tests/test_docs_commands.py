@@ -7,7 +7,7 @@ A page's blocks:
     ```c title="main.c"          a file that the reader writes, in any language
 
 In shown output a line `...` stands for any lines that were left out, and `...` in a line for any text. Numbers before a
-unit of time (s, ms, us) depend on the machine and are not compared. `pytest --update-golden` writes what is printed
+unit of time (s, ms, µs) depend on the machine and are not compared. `pytest --update-golden` writes what is printed
 today into the pages; read the difference before you commit it.
 """
 
@@ -54,7 +54,7 @@ SLOW = {
 }
 
 FENCE = re.compile(r"```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)```\n", re.DOTALL)
-TIME = re.compile(r"\b\d+(?:\.\d+)?(?= (?:s|ms|us)\b)")
+TIME = re.compile(r"\b\d+(?:\.\d+)?(?= (?:s|ms|µs)\b)")
 
 
 @dataclass(frozen=True)

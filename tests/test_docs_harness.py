@@ -98,7 +98,7 @@ def test_the_times_are_those_of_the_arithmetic() -> None:
         fast = f"{port_us(whole, 400_000):.1f}" if chip.clock_hz >= 400_000 else ""
         assert found[name] == (str(whole.wire_bytes), f"{port_us(whole, 100_000):.1f}", fast)
     one_port = {f"{port_us(CHIPS[name].readings[0], 400_000):.1f}" for name in ("mcp23017", "pca9555")}
-    times = r"one port of an MCP23017 or PCA9555 takes (\S+) us, a selection\son a TCA9548A (\S+) us"
+    times = r"one port of an MCP23017 or PCA9555 takes (\S+) µs, a selection\son a TCA9548A (\S+) µs"
     (said,) = re.findall(times, PAGE)
     assert said == (*one_port, f"{select_us(400_000):.1f}")
 

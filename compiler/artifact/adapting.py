@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -11,7 +12,7 @@ from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME, Build, read_member
-from thenar.runtime.hand import HAND_NAME
+from thenar.runtime.hand import HAND_NAME, hand_from_bytes
 from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Switch, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, IntegerTables, tables_to_bytes
@@ -21,6 +22,7 @@ from thenar.runtime.names import list_names, nearest, shortened
 from thenar.runtime.published import NONE
 from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
 
+from ..evaluation.rates import Rate
 from ..model.collapse import collapse
 from ..model.compare import compare
 from ..recogniser import predicted_classes
@@ -31,7 +33,7 @@ from ..scan_file import SCAN_NAME
 from ..wearer import STRENGTH, Adaptation
 from . import CompileError
 from .compile import check_target, closed_shares, origin_of, proof_of, publish, sha256
-from .documents import SPEC_FOLDER
+from .documents import REPORT_NAME, SPEC_FOLDER, stated_report
 from .ensemble import ensemble_to_bytes
 from .verify import load_ensemble
 from .verify_firmware import made_firmware
@@ -49,6 +51,8 @@ class AdaptedBuild:
         The content of `build.json`.
     before, after : int
         The person's trials that the other build recognises, and those that it recognises adapted to all others.
+    by_type : tuple of (int, int, int)
+        For each grasp type of the manifest: the person's trials, and which of them are counted in before and in after.
     warnings : tuple of str
         Sentences on trials that contradict each other, and on types without trials.
     firmware : str
@@ -59,6 +63,7 @@ class AdaptedBuild:
     manifest: Manifest
     before: int
     after: int
+    by_type: tuple[tuple[int, int, int], ...]
     warnings: tuple[str, ...]
     firmware: str
 
@@ -74,8 +79,8 @@ def adapt(
 ) -> AdaptedBuild:
     """Write a build for one person: the same elements, thresholds and kinds of terms, with scores for this person.
 
-    The base dependencies suffice; without the extra `compiler` the build has no firmware. The same input gives the same
-    bytes on every machine.
+    The base dependencies suffice; without the extra `compiler` the build has no firmware and no report. The same input
+    gives the same bytes on every machine.
 
     Parameters
     ----------
@@ -148,9 +153,11 @@ def adapt(
     guesses = [labels, known[winners(before.scores(bits, codes))], winners(adaptation.left_out)]
     guesses.append(predicted_classes(tables, rejection, bits, codes))
     truth, *rows = decided(np.stack(guesses), np.unique(trial, return_inverse=True)[1])
-    unadapted, left_out, learnt = (int(np.count_nonzero(row == truth)) for row in rows)
+    right = [np.bincount(truth[row == truth], minlength=len(names)).tolist() for row in rows]
+    unadapted, left_out, learnt = map(sum, right)
     counts, seed = np.bincount(truth, minlength=len(names)).tolist(), manifest.options.seed
     of: Of = "within subject"
+    ends = Rate.counted((left_out,), len(truth), of=of)
     files = {TABLES_NAME: tables_to_bytes(tables), ENSEMBLE_NAME: ensemble_to_bytes(adaptation.adapted)}
     described = manifest_to_bytes(
         structs.replace(
@@ -163,7 +170,7 @@ def adapt(
             proof=proof_of(tables, compare(adaptation.adapted, tables, bits, codes), manifest.options.width),
             rates=(
                 Recognised("training", 0, seed, learnt, len(truth), of, "trials"),
-                Recognised("nested", len(truth), seed, left_out, len(truth), of, "trials"),
+                Recognised("nested", len(truth), seed, left_out, len(truth), of, "trials", ends.low, ends.high),
             ),
             faults=None,
             detection=(),
@@ -173,13 +180,20 @@ def adapt(
         )
     )
     personal = manifest_from_bytes(described)
-    try:
+    files |= _carried(source, manifest)
+    note = ""
+    with suppress(ModuleNotFoundError):
         firmware, note = made_firmware(personal, tables)
-    except ModuleNotFoundError:
-        firmware, note = {}, ""
-    files |= {path: text.encode() for path, text in firmware.items()} | _carried(source, manifest)
+        files |= {path: text.encode() for path, text in firmware.items()}
+        hand = hand_from_bytes(files[HAND_NAME], personal)
+        confusion = np.zeros((len(names), len(names)), np.intp)
+        np.add.at(confusion, (labels, guesses[2]), 1)
+        build = Build(personal, tables)
+        files[REPORT_NAME] = stated_report(build, hand, bits, codes, labels, note, confusion)
     publish(files | {MANIFEST_NAME: described}, target)
-    return AdaptedBuild(target, personal, unadapted, left_out, tuple(_warnings(personal, adaptation)), note)
+    warnings = tuple(_warnings(personal, adaptation, recordings))
+    by_type = tuple(zip(counts, *right[:2], strict=True))
+    return AdaptedBuild(target, personal, unadapted, left_out, by_type, warnings, note)
 
 
 def _inputs(
@@ -330,11 +344,15 @@ def _carried(folder: Path, manifest: Manifest) -> dict[str, bytes]:
     return files | {f"{SPEC_FOLDER}/{path.name}": read_member(path, MAX_BYTES) for path in spec}
 
 
-def _warnings(personal: Manifest, adaptation: Adaptation) -> Iterator[str]:
+def _warnings(personal: Manifest, adaptation: Adaptation, recordings: GraspSet) -> Iterator[str]:
     assert personal.adapted is not None
-    for classes in adaptation.contradictions:
+    first = np.unique(adaptation.trials, return_index=True)[1]
+    for classes, trials in adaptation.contradictions.items():
         names = list_names([personal.grasps[number] for number in classes])
-        yield f"a frame is the same for {names}: if one of these trials was labelled wrongly, leave it out"
+        numbers = list_names([str(recordings.trials[first[trial]]) for trial in sorted(trials)])
+        yield (
+            f"a frame is the same for {names}, in trials {numbers}: if one of these was labelled wrongly, leave it out"
+        )
     if missing := [name for name, count in zip(personal.grasps, personal.adapted.counts, strict=True) if not count]:
         added = personal.adapted.added
         change = (

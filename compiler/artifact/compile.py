@@ -39,7 +39,7 @@ from ..scan_file import SCAN_NAME, scanmap_to_bytes
 from ..trainers.base import SHARED, Report, Training
 from ..wearer import STRENGTH
 from . import CompileError
-from .documents import REPORT_NAME, SPEC_FOLDER, TRY_NAME, BuildReport, Documents
+from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents
 from .ensemble import ensemble_to_bytes
 from .training import (
     Tested,
@@ -57,7 +57,7 @@ from .wearers import related_joints
 
 # Without a harness a build has no scan map; a build too large for every microcontroller has no firmware; one without a
 # report has no spec.
-MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME, HAND_NAME, REPORT_NAME, TRY_NAME})
+MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME, HAND_NAME, REPORT_NAME})
 _FOLDERS = {FIRMWARE_NAME: frozenset(LIBRARY_FILES), SPEC_FOLDER: NAMES}
 
 
@@ -253,8 +253,6 @@ class BuildAssembly:
 
     def publish(self, target: Path, tested: Tested | None, documents: Documents | None) -> BuildReport:
         """Write the build as `target`, with the requested `documents`."""
-        from ..report.tryout import try_html
-
         kept, names, n_switches = self.kept, self.grasp_set.element_names, len(self.grasp_set.switch_names)
         files = {TABLES_NAME: tables_to_bytes(self.integers), ENSEMBLE_NAME: ensemble_to_bytes(self.recogniser.model)}
         if self.scan is not None:
@@ -265,10 +263,6 @@ class BuildAssembly:
         described = manifest_to_bytes(replace(undrawn, hand_sha256=sha256(files[HAND_NAME])))
         manifest = manifest_from_bytes(described)
         firmware, note = made_firmware(manifest, self.integers)
-        hand = hand_from_bytes(files[HAND_NAME], manifest)
-        page = try_html(manifest, files[TABLES_NAME], hand, kept)
-        if page is not None:
-            files[TRY_NAME] = page
         predicted = np.unique(self.comparison.deployed)
         report = BuildReport(
             folder=target,
@@ -283,7 +277,7 @@ class BuildAssembly:
             recogniser=self.recogniser,
             comparison=self.comparison,
             faults=self.faults,
-            has_page=page is not None,
+            drawing=hand_from_bytes(files[HAND_NAME], manifest),
             unread=self.unread,
             confusion=None if tested is None else tested.confusion,
         )

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.build import Build
+from thenar.runtime.hand import HandDrawing, load_hand
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..facts import Fact, facts
@@ -19,13 +21,15 @@ from ..model.compare import Comparison, worst_case
 from ..model.faults import FaultCounts
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
+from ..samples import select_inputs
+from .verify import labels_of
 
 if TYPE_CHECKING:
     from ..frontier.points import Frontier
     from ..glove.prices import Part
     from ..movements.transitions import Transitions
 
-REPORT_NAME, TRY_NAME, SPEC_FOLDER = "report.html", "try.html", "spec"
+REPORT_NAME, SPEC_FOLDER = "report.html", "spec"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -53,8 +57,8 @@ class BuildReport:
         The training set, the trained model, and the training rows through the model, its tables and the integers.
     faults : FaultCounts
         The accuracy that remains on the training rows under each input fault.
-    has_page : bool
-        Whether it has `try.html`, which is left out where tables and hand are too large for a page.
+    drawing : HandDrawing
+        The content of `hand.json`.
     confusion : ndarray of int, shape (K, K), or None
         How often the folds predicted each grasp type (columns) for rows of each type (rows); None without folds.
     """
@@ -72,7 +76,7 @@ class BuildReport:
     recogniser: Recogniser
     comparison: Comparison
     faults: FaultCounts
-    has_page: bool
+    drawing: HandDrawing
     confusion: NDArray[np.intp] | None
 
     @property
@@ -128,13 +132,17 @@ class Documents:
     def _report(self, made: BuildReport) -> bytes:
         from ..report.content import ReportContent
         from ..report.page import report_html
+        from ..report.tryout import page_data
 
+        rows = made.recogniser.read(made.recogniser.samples)
+        tables = tables_to_bytes(made.tables)
         names = [switch.name for switch in made.manifest.switches]
         return report_html(
             ReportContent(
                 manifest=made.manifest,
                 tables=made.tables,
                 facts=made.facts,
+                data=page_data(made.manifest, tables, made.drawing, rows.switches, rows.codes, rows.labels),
                 warnings=made.warnings,
                 tree=made.recogniser.selection.tree,
                 confusion=made.confusion,
@@ -146,7 +154,6 @@ class Documents:
                 transitions=_transitions(made.grasp_set),
                 comparison=made.comparison,
                 faults=made.faults,
-                has_page=made.has_page,
                 worst=worst_case(made.recogniser.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )
@@ -161,3 +168,56 @@ def _transitions(grasp_set: GraspSet) -> "Transitions | None":
         return Transitions.of_set(grasp_set) if grasp_set.is_none.any() else None
     except RecordingError:
         return None
+
+
+def report_of_build(folder: str | Path, grasp_set: GraspSet | None = None) -> bytes:
+    """Return the page of the build in `folder`: its `report.html`, or else one made of what the folder states.
+
+    Parameters
+    ----------
+    folder : path
+        The build.
+    grasp_set : GraspSet, optional
+        Recordings with its inputs: some of their rows go into a page that is made.
+
+    Raises
+    ------
+    BuildError, FormatError
+        If the folder is not a valid build.
+    CompileError
+        If the recordings lack inputs of the build.
+    """
+    where = Path(folder)
+    build = Build.load(where)
+    if (where / REPORT_NAME).is_file():
+        return (where / REPORT_NAME).read_bytes()
+    manifest = build.manifest
+    if grasp_set is None:
+        bits, codes = np.zeros((0, len(manifest.switches)), bool), np.zeros((0, len(manifest.joints)), np.uint16)
+        labels = np.zeros(0, np.intp)
+    else:
+        labels = labels_of(np.array(build.grasps), grasp_set)
+        bits, codes = select_inputs(grasp_set, manifest)
+    return stated_report(build, load_hand(where, manifest), bits, codes, labels)
+
+
+def stated_report(
+    build: Build,
+    hand: HandDrawing,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    labels: NDArray[np.intp],
+    firmware: str = "",
+    confusion: NDArray[np.intp] | None = None,
+) -> bytes:
+    """Return the page of a build, of what it states itself, of rows of its inputs (n, s) and (n, j) with labels (n,),
+    and of what else is known of it, as in a BuildReport.
+    """
+    from ..report.content import ReportContent
+    from ..report.page import report_html
+    from ..report.tryout import page_data
+
+    tables = tables_to_bytes(build.tables)
+    data = page_data(build.manifest, tables, hand, bits, codes, labels)
+    about = facts(build.manifest, tables_bytes=len(tables), firmware=firmware)
+    return report_html(ReportContent(build.manifest, build.tables, about, data, confusion=confusion))

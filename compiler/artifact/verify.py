@@ -243,7 +243,7 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Report | No
     bits, codes = select_inputs(grasp_set, manifest)
     scan, sources = load_scan(Path(folder), manifest), [switch.source for switch in manifest.switches]
     groups = groups_of(scan, sources, build.tables.n_joints)
-    labels = _labels(np.array(build.grasps), grasp_set)
+    labels = labels_of(np.array(build.grasps), grasp_set)
     counts = count_faults(build.tables, bits, codes, labels, grasp_set.trial_ids, tuple(groups.values()), progress)
     names = [*(each.name for each in manifest.switches), *(each.name for each in manifest.joints)]
     stuck = (
@@ -258,7 +258,7 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Report | No
     )
 
 
-def _labels(grasps: NDArray[np.str_], grasp_set: GraspSet) -> NDArray[np.intp]:
+def labels_of(grasps: NDArray[np.str_], grasp_set: GraspSet) -> NDArray[np.intp]:
     """Return the class of each row (n,); types that the build does not know get a number beyond its classes."""
     known = np.append(grasp_set.grasps[:, None] == grasps, np.ones((len(grasp_set), 1), bool), axis=1)
     return np.asarray(known.argmax(axis=1))
@@ -280,7 +280,7 @@ def load_ensemble(folder: Path, build: Build) -> Model:
 def _recognised(
     trained: NDArray[np.intp], deployed: NDArray[np.intp], grasps: NDArray[np.str_], grasp_set: GraspSet
 ) -> tuple[Counted, ...]:
-    labels, held = _labels(grasps, grasp_set), ~grasp_set.is_none
+    labels, held = labels_of(grasps, grasp_set), ~grasp_set.is_none
     # The number of an unknown type must differ from the one of rejected frames.
     labels[labels == len(grasps)] = len(grasps) + 1
     if not held.any():

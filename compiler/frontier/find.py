@@ -299,7 +299,7 @@ def _picked(frontier: Frontier, budget_us: float | None, rate: float | None) -> 
 def _in_words(budget_us: float | None, rate: float | None) -> str:
     """Return the goal for which a point is to be picked, "" for none."""
     if budget_us is not None:
-        return f"the best within {budget_us:g} us a frame"
+        return f"the best within {budget_us:g} µs a frame"
     return "" if rate is None else f"the fastest that recognises {100 * rate:g} %"
 
 

@@ -163,7 +163,7 @@ def overhead_of(target: str) -> ReadingCost:
         return ReadingCost(
             each_us=PI_CALL_US,
             how="guess",
-            what=f"a transfer on a Raspberry Pi is taken to have {PI_CALL_US:g} us of overhead, which is a guess from "
+            what=f"a transfer on a Raspberry Pi is taken to have {PI_CALL_US:g} µs of overhead, which is a guess from "
             "a kernel trace of a Pi 3",
         )
     return ReadingCost(what=f"scans on {target} are those of the wire alone, without the time of its program")
@@ -251,6 +251,6 @@ def records_of(
 
 
 _FORMULA = (
-    "a CyberGlove's record is the vendor's formula, of a single source: each sensor is digitised in 250 us "
-    "(376 us through the filter) before the record is sent; thenar doctor measures a connected glove"
+    "a CyberGlove's record is the vendor's formula, of a single source: each sensor is digitised in 250 µs "
+    "(376 µs through the filter) before the record is sent; thenar doctor measures a connected glove"
 )

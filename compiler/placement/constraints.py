@@ -144,7 +144,7 @@ class Limits:
             fit = sum(us <= self.budget_us for us in self.records_us)
         if len(keep) > fit:
             raise TrainingError(
-                f"``have`` names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} us, "
+                f"``have`` names {len(keep)} joints, whose record takes {self.records_us[len(keep) - 1]:.1f} µs, "
                 f"``budget_us`` allows {self.budget_us:g}: name fewer, or allow more"
             )
         return keep, never, fit if most is None else min(most, fit)
@@ -209,7 +209,7 @@ class Bound:
             taken = sum(self._times[port] for port in {self.ports.port_of[one] for one in kept})
             if taken > _ns(limits.budget_us):
                 raise TrainingError(
-                    f"``have`` takes {taken / 1000:.1f} us to read, ``budget_us`` allows {limits.budget_us:g}: "
+                    f"``have`` takes {taken / 1000:.1f} µs to read, ``budget_us`` allows {limits.budget_us:g}: "
                     "name fewer, or allow more"
                 )
         if self.never.size and not kept and not self.addable(()).any():

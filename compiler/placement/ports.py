@@ -71,7 +71,7 @@ class PortCosts:
         if any(not 0 <= port < len(self.us) for port in self.port_of):
             raise TrainingError(f"every switch must be on one of the {len(self.us)} ports with a given time")
         if any(not 0 <= us < float("inf") for us in self.us):
-            raise TrainingError("the time that reading a port takes must be finite and at least 0 us")
+            raise TrainingError("the time that reading a port takes must be finite and at least 0 µs")
 
     def shares(self, kept: Iterable[int]) -> NDArray[np.float64]:
         """Return each kept switch's share of its port's time, split evenly among the port's kept switches, as a

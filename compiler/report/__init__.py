@@ -1,1 +1,1 @@
-"""The pages of a build, each in one file that works offline: `report.html` shows it, `try.html` lets one try it."""
+"""The page of a build, in one file that works offline: a summary, a report, and a try."""

@@ -1,15 +1,15 @@
-"""`report_html`: one HTML file that needs no other file, no network and no date."""
+"""The page of a build: one HTML file with its summary, its report and a try, without network, other files or a date."""
 
-from dataclasses import replace
 from functools import lru_cache, partial
 
 from thenar.drivers.extras import optional
 
 from ..facts import SensorCount
-from ..pictures import colour_variables, templates
+from ..pictures import colour_variables, embedded, policy_hash, templates
 from ..text import sentence
 from . import frontier, sections
-from .content import HandPicture, ReportContent, hand_picture
+from .content import ReportContent
+from .tryout import script, shared
 
 with optional():
     from jinja2 import Environment
@@ -17,22 +17,27 @@ with optional():
 
 
 def report_html(content: ReportContent) -> bytes:
-    """Return the report in UTF-8; the same content gives the same bytes.
+    """Return the page in UTF-8; the same content gives the same bytes.
 
-    The page's policy allows no script and no requests: any name stays text.
+    Its policy allows its own script and style, and no requests: any name stays text.
     """
     environment = _environment()
     assert environment.loader is not None
-    style = environment.loader.get_source(environment, "report.css")[0]
+    style = shared("hand.css") + colour_variables() + environment.loader.get_source(environment, "report.css")[0]
+    whole = script("tables" in content.data)
     page = environment.get_template("report.html.j2").render(
         content=content,
         manifest=content.manifest,
+        sensors=SensorCount.of_build(content.manifest),
         facts=partial(_facts, content),
         sections=sections,
-        hand=_hand(content),
         confusion=sections.confusion_of(content),
         frontier=frontier,
-        style=Markup(colour_variables() + style),
+        style=Markup(style),
+        style_sha256=policy_hash(style),
+        script=Markup(whole),
+        script_sha256=policy_hash(whole),
+        data=embedded(content.data),
     )
     return page.encode()
 
@@ -48,14 +53,3 @@ def _environment() -> Environment:
     environment = templates(__package__, "templates")
     environment.filters["sentence"] = sentence
     return environment
-
-
-def _hand(content: ReportContent) -> HandPicture | None:
-    if content.hand is None or not content.sources:
-        return None
-    placed = replace(SensorCount.of_build(content.manifest), joints=(0, 0))
-    summary = (
-        f"{content.hand.view}; {placed} are kept and numbered in the order in which they were chosen. "
-        "The table lists them."
-    )
-    return hand_picture(content.hand, content.sources, "kept-hand", "Kept sensors on the hand", sentence(summary))

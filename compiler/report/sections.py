@@ -20,7 +20,7 @@ from ..movements.transitions import Transitions
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
 from ..placement.tree import Tree
-from ..text import NBSP, counted, microseconds, percent, sentence
+from ..text import NBSP, counted, duration, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
 
@@ -50,6 +50,29 @@ def headline(content: ReportContent) -> str:
         f"the best of {tried:,} combinations by its rate, which is therefore expected to be {100 * point.luck:.1f} "
         "points too high."
     )
+
+
+def headline_rate(manifest: Manifest) -> str:
+    """Return the accuracy of a build in short, with its interval: "86.1 % [42.9, 98.1]"; "" without one."""
+    rate = manifest.headline
+    if rate is None:
+        return ""
+    ends = "" if rate.low is None or rate.high is None else f" [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
+    return f"{percent(rate.rate, NBSP)}{ends}"
+
+
+def frame_time(content: ReportContent) -> Sequence[tuple[str, str]]:
+    """Return the time of a frame, in words, as the frontier tells it of the build's point; nothing without a point."""
+    if content.frontier is None or content.point is None:
+        return []
+    frame = content.frontier.point(content.point).frame
+    return [("Frame time", f"{duration(frame.us)} {frame.how}, on {content.frontier.machine}")]
+
+
+def neutral(manifest: Manifest) -> str:
+    """Return the first state of what one tries, in words."""
+    states = ["all switches open"] * bool(manifest.switches) + ["joints in the middle"] * bool(manifest.joints)
+    return sentence(", ".join(states)).removesuffix(".")
 
 
 def _rate_in_words(rate: float, low: float | None, high: float | None) -> str:

@@ -1,4 +1,4 @@
-"""`try_html`: a build to try out in a browser, its tables, its hand and some of its rows in one file."""
+"""What a build's page is driven by: its data (hand, tables, some rows), and its script."""
 
 import base64
 import re
@@ -10,41 +10,40 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.extras import optional
 from thenar.runtime.hand import HandDrawing
 from thenar.runtime.manifest import Calibration, Manifest, Threshold
 from thenar.runtime.scores import none_leads
 
-from ..facts import SensorCount
-from ..pictures import embedded, policy_hash, templates
-from ..samples import Samples
-
-with optional():
-    from jinja2 import Environment
-    from markupsafe import Markup
-
-MOST_BYTES = 500_000
+# Of the data, without and with rows: an e-mail takes a page of this size.
+MOST_BYTES, _ROWS_BYTES = 500_000, 200_000
 _MOST_ROWS = 400
-# To keep the page small with its rows.
-_ROWS_BYTES = 200_000
 # In dependency order: a module comes after those that it imports.
-_MODULES = ("tables.js", "rows.js", "try.js")
+_PAGE, _TRY = ("page.js",), ("tables.js", "rows.js", "try.js")
 _EXPORT = re.compile(r"^export (?:function|class) (\w+)", re.MULTILINE)
 
 Json = Mapping[str, object]
 
 
-def try_html(manifest: Manifest, tables: bytes, hand: HandDrawing, samples: Samples) -> bytes | None:
-    """Return the page in UTF-8, at most MOST_BYTES; None where tables and hand alone are larger.
+def page_data(
+    manifest: Manifest,
+    tables: bytes,
+    hand: HandDrawing,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    labels: NDArray[np.intp],
+) -> Json:
+    """Return the data, at most MOST_BYTES of JSON; the hand alone if tables and hand are larger.
 
     Parameters
     ----------
     manifest, tables, hand : Manifest, bytes, HandDrawing
         The contents of `build.json`, `tables.bin` and `hand.json`.
-    samples : Samples
-        The training rows, as the build reads them; some of each grasp type go into the page.
+    bits, codes : array, shape (n, s) and (n, j)
+        Rows as the build reads them, such as those trained on; some of each grasp type are in the data.
+    labels : array of int, shape (n,)
+        The grasp type of each row, which indexes those of the manifest.
     """
-    codes, labels, rejection = samples.codes, samples.labels, manifest.rejection
+    rejection = manifest.rejection
     data = {
         "classes": manifest.classes,
         "tables": base64.b64encode(tables).decode(),
@@ -60,22 +59,23 @@ def try_html(manifest: Manifest, tables: bytes, hand: HandDrawing, samples: Samp
         "switches": [_switch(switch.name, switch.threshold) for switch in manifest.switches],
         "joints": [_joint(joint, codes[:, number]) for number, joint in enumerate(manifest.joints)],
         "hand": hand,
+        "rows": [],
     }
-    bare = _rendered(manifest, {**data, "rows": []})
-    some: list[object] = []
-    left = min(MOST_BYTES - len(bare), _ROWS_BYTES)
+    left = MOST_BYTES - len(msgspec.json.encode(data))
     if left < 0:
-        return None
+        return {"hand": hand}
+    left = min(left, _ROWS_BYTES)
+    rows: list[object] = []
     for row in sample(labels, len(manifest.grasps)):
         # A digit for every four switches, the first of them in its lowest bit.
-        padded = np.append(samples.switches[row], np.zeros(-samples.n_switches % 4, np.bool_)).reshape(-1, 4)
+        padded = np.append(bits[row], np.zeros(-bits.shape[1] % 4, np.bool_)).reshape(-1, 4)
         closed = "".join(f"{digit:x}" for digit in (padded @ np.array([1, 2, 4, 8])).tolist())
-        each = [int(labels[row]), closed, codes[row].tolist()]
-        left -= len(msgspec.json.encode(each)) + 1
+        rows.append([int(labels[row]), closed, codes[row].tolist()])
+        left -= len(msgspec.json.encode(rows[-1])) + 1
         if left < 0:
+            rows.pop()
             break
-        some.append(each)
-    return _rendered(manifest, {**data, "rows": some})
+    return {**data, "rows": rows}
 
 
 def sample(labels: NDArray[np.intp], classes: int) -> list[int]:
@@ -102,58 +102,26 @@ def _switch(name: str, threshold: Threshold | None) -> Json:
 
 
 def _joint(joint: Calibration, codes: NDArray[np.uint16]) -> Json:
-    low, middle, high = np.percentile(codes, (0, 50, 100), method="lower").tolist() if len(codes) else (0, 0, 1)
-    return {**_line(joint), "range": [int(low), max(int(high), int(low) + 1)], "typical": int(middle)}
+    low, high = sorted((joint.code_a, joint.code_b))
+    middle = (low + high) // 2
+    if len(codes):
+        low, middle, high = np.percentile(codes, (0, 50, 100), method="lower").astype(int).tolist()
+    return {**_line(joint), "range": [low, max(high, low + 1)], "typical": middle}
 
 
-def _rendered(manifest: Manifest, data: Json) -> bytes:
-    style, script = _style(), _script()
-    levels = sum(switch.threshold is not None for switch in manifest.switches)
-    # What the page's first state is, too.
-    open_all = ["All switches open"] if manifest.switches else []
-    neutral = ", ".join([*open_all, *(["joints at the medians of the rows"] if manifest.joints else [])])
-    page = (
-        _environment()
-        .get_template("try.html.j2")
-        .render(
-            style=Markup(style),
-            style_sha256=policy_hash(style),
-            script=Markup(script),
-            script_sha256=policy_hash(script),
-            sentence=f"It distinguishes {len(manifest.classes)} classes by {SensorCount.of_build(manifest)}.",
-            levels=levels,
-            neutral=neutral[:1].upper() + neutral[1:],
-            knows_none=manifest.knows_none,
-            checksum=manifest.checksum[:16],
-            version=manifest.thenar,
-            data=embedded(data),
-        )
-    )
-    return page.encode()
-
-
-@lru_cache(maxsize=1)
-def _environment() -> Environment:
-    return templates(__package__, "templates")
-
-
-def _own(name: str) -> str:
-    return files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
-
-
-def _shared(name: str) -> str:
+def shared(name: str) -> str:
+    """Return a file that live pages have, too."""
     return files("thenar.runtime").joinpath("web", "pages", name).read_text(encoding="utf-8")
 
 
-@lru_cache(maxsize=1)
-def _style() -> str:
-    return f"{_shared('hand.css')}{_own('try.css')}"
-
-
-@lru_cache(maxsize=1)
-def _script() -> str:
-    """Return all modules as one script, each in a separate scope from which its exports are taken."""
-    return "".join(map(scoped, (_shared("hand.js"), *map(_own, _MODULES))))
+@lru_cache(maxsize=2)
+def script(tries: bool) -> str:
+    """Return all modules as one script, each in a separate scope from which its exports are taken; `tries` says whether
+    the page has tables to try.
+    """
+    names = (*_PAGE, *(_TRY if tries else ()))
+    own = (files(__package__).joinpath("templates", name).read_text(encoding="utf-8") for name in names)
+    return "".join(map(scoped, (shared("hand.js"), *own)))
 
 
 def scoped(module: str) -> str:

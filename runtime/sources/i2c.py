@@ -1,5 +1,6 @@
 """I2C buses of a harness, their ports read in the order of a scan map."""
 
+import time
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +15,7 @@ from ..published import Count
 from ..scanning.scanmap import SCHEMA, Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
 from ..taxels import TaxelCalibration, Taxels, calibration_of
-from .base import Pace, Source, SourceKind, debouncer_of, paced_us
+from .base import Source, SourceKind, debouncer_of, paced_us
 
 
 class PortSwitches:
@@ -70,7 +71,7 @@ class PortScanner(Source):
         self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
         self._wire_us = scan_us(ScanMap(SCHEMA, tuple(ports)), harness).us
         self._everything = len(harness.taxel_names)
-        self._pace, self._held_up = Pace(wiring.rate_hz), 0
+        self._every_s, self._due_s, self._held_up = 1.0 / wiring.rate_hz, 0.0, 0
 
     @property
     def wire_us(self) -> float:
@@ -83,8 +84,14 @@ class PortScanner(Source):
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
         """Scan once, when it is due."""
-        if not self._pace.wait(timeout_s):
+        left_s = self._due_s - time.monotonic()
+        if left_s > 0.0:
+            time.sleep(min(left_s, timeout_s))
+        if left_s > timeout_s:
             return None
+        # No scan makes up for a late one.
+        now_s, next_s = time.monotonic(), self._due_s + self._every_s
+        self._due_s = next_s if next_s > now_s else now_s + self._every_s
         began_us, closed, lost = now_us(), 0, 0
         codes: list[int | None] = [None] * self._everything
         for port, reply in zip(self._ports, self.replies(), strict=True):

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from time import localtime, strftime, time
 
 import msgspec
 
@@ -22,10 +23,15 @@ from ..scores import softmax
 from ..taxels import calibration_of
 from .server import Server, message
 
-# Length of the past that a page shows, and more changes of the prediction than usually come in it.
-PAST_US, _MOST_CHANGES = 30_000_000, 6_000
-# A prediction's time, candidate, grasp, health, state, and its segment's number, type and beginning.
-Change = tuple[int, str, str, str, str, int, str, int | None]
+# Changes that a page opened later gets: ten minutes of a hand that is never still.
+_MOST_CHANGES = 6_000
+# A time without moments is unknown. A source is silent after half a second, or after three of its periods.
+_GAP_US, _SILENT_US, _PERIODS = 1_000_000, 500_000, 3
+# What is said of the glove is repeated once a second, and is not known when it was not.
+_LASTS_S = 3
+# What a timeline shows of a prediction: its time, the announced type, "degraded" or "unknown" health, and the segment's
+# type and beginning.
+Change = tuple[int, str, str, str, int | None]
 _encode = msgspec.json.Encoder().encode
 _FRAME = b'{"topic":"frame",'
 
@@ -36,11 +42,13 @@ class LivePage:
     Parameters
     ----------
     server : Server
-        The server, on which the topics "build", "hand", "past", "frame" and "health" are published.
+        The server, on which the topics "build", "hand", "past", "frame", "health" and "glove" are published.
     glove : Glove
         The running glove.
     folder : Path
         The build's folder, whose hand is drawn.
+    after : LivePage, optional
+        The page of a run that this one continues: its past stays.
 
     Raises
     ------
@@ -48,14 +56,20 @@ class LivePage:
         If the build's drawing of a hand is damaged.
     """
 
-    def __init__(self, server: Server, glove: Glove, folder: Path) -> None:
+    def __init__(self, server: Server, glove: Glove, folder: Path, after: "LivePage | None" = None) -> None:
         self.server, self._glove = server, glove
         self._frames = FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
         # The latest changes of the prediction, for pages opened later.
-        self._past, self._until_us = deque[Change](maxlen=_MOST_CHANGES), 0
+        self._past: deque[Change] = deque(maxlen=_MOST_CHANGES) if after is None else after._past
+        self._until_us: int = 0 if after is None else after._until_us
+        # The devices that are lost, and since when; and what was said of the glove.
+        self._lost, self._said = dict[str, str](), ("", "")
+        periods = glove.sources.switch_period_us, glove.sources.glove_period_us
+        self._silent_us = max(_SILENT_US, *(_PERIODS * (period or 0) for period in periods))
         manifest = glove.system.build.manifest
-        server.publish("build", build_message(manifest, preshapes=glove.has_preshapes))
+        about = build_message("build", manifest, folder.resolve().name, preshapes=glove.has_preshapes)
+        server.publish("build", about)
         server.publish("hand", message("hand", load_hand(folder, manifest)))
         server.publish("past", self._past_message)
 
@@ -63,21 +77,54 @@ class LivePage:
         """Show the moment that the glove has just published. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
         self.server.publish("frame", partial(self._frames, moment))
-        self._until_us, change = grasp.time_us, change_of(grasp)
+        change = change_of(grasp)
+        if self._past and grasp.time_us - self._until_us > _GAP_US:
+            self._past.append((self._until_us, "", "", "", None))
         if not self._past or change[1:] != self._past[-1][1:]:
             self._past.append(change)
-        if glove.health is not self._health and glove.health is not None:
-            self._health = glove.health
-            self.server.publish("health", partial(message, "health", self._health))
+        self._until_us = grasp.time_us
+        health, known = glove.health, self._health
+        if health is not None and health is not known:
+            gone = [device.name for device in health.devices if not device.connected]
+            state = "not connected" if known is None else f"lost since {_clock(0)}"
+            self._health, self._lost = health, {name: self._lost.get(name, state) for name in gone}
+            self.server.publish("health", partial(message, "health", health))
+        said = self._state(grasp)
+        if health is not known or said != self._said:
+            self._said = said
+            self.server.publish("glove", partial(self._glove_message, *said))
+
+    def _state(self, grasp: LiveGrasp) -> tuple[str, str]:
+        """Return how the glove is, "good", "warn" or "bad", and in words."""
+        age_us = min((age for age in (grasp.switch_age_us, grasp.glove_age_us) if age is not None), default=None)
+        if self._lost:
+            return "bad", ", ".join(f"{name} {state}" for name, state in self._lost.items())
+        if age_us is None:
+            return "warn", "sends nothing yet"
+        if age_us > self._silent_us:
+            return "bad", self._said[1] if self._said[1].startswith("silent") else f"silent since {_clock(age_us)}"
+        return "good", "connected"
+
+    def _glove_message(self, level: str, words: str) -> bytes:
+        """Return the message on the glove's state, which is old if the run has stopped since."""
+        if now_us() - self._until_us > 1_000_000 * _LASTS_S:
+            level, words = "bad", f"silent since {_clock(now_us() - self._until_us)}"
+        return message("glove", {"is": level}, words=words, lasts_s=_LASTS_S)
 
     def _past_message(self) -> bytes:
         return message("past", changes=list(self._past.copy()), until_us=self._until_us)
 
 
+def _clock(ago_us: int) -> str:
+    """Return the time of day: "10:24:07"."""
+    return strftime("%H:%M:%S", localtime(time() - ago_us / 1e6))
+
+
 def change_of(grasp: LiveGrasp) -> Change:
-    """Return a prediction as pages keep it, its time first: they show where the rest changes."""
-    now = grasp.candidate, grasp.grasp, grasp.health, grasp.state, grasp.segment, grasp.segment_type
-    return (grasp.time_us, *now, grasp.segment_us)
+    """Return a prediction as timelines show it. A segment that forms may still be revoked."""
+    began_us = grasp.segment_us if grasp.state in ("held", "releasing") else None
+    health = grasp.health if grasp.health in ("degraded", "unknown") else ""
+    return grasp.time_us, grasp.grasp, health, "" if began_us is None else grasp.segment_type, began_us
 
 
 def shell_message(
@@ -102,17 +149,18 @@ def shell_message(
     return message("shell", project=project, build=build, rate=rate, pages=pages, wearer=wearer)
 
 
-def build_message(manifest: Manifest, **shows: bool) -> bytes:
-    """Return the message on a build: its types, switches and joints; whether it knows an empty hand; and what else the
-    page `shows`: "preshapes" or a "replay".
+def build_message(topic: str, manifest: Manifest, name: str, **shows: object) -> bytes:
+    """Return a message on a build: its name, types, switches and joints, whether it knows an empty hand, and what else
+    the page `shows`.
     """
     known = {
+        "name": name,
         "grasps": manifest.classes,
         "switches": [switch.name for switch in manifest.switches],
         "joints": [joint.name for joint in manifest.joints],
         "empty_hand": manifest.knows_none,
     }
-    return message("build", known, **{"preshapes": False, "replay": False} | shows)
+    return message(topic, known, **{"preshapes": False} | shows)
 
 
 class FrameText:

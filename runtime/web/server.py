@@ -8,12 +8,14 @@ ping, for five seconds is dropped.
 
 import asyncio
 import logging
+import secrets
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
 from typing import TypeVar
+from urllib.parse import quote
 
 import msgspec
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -47,6 +49,8 @@ PING_S = 5.0 / 1.5
 _SEND_BUFFER = 65_536
 # A page sends a few words when a user presses a button or holds a key.
 MOST_BYTES, MOST_PER_S, MOST_AT_ONCE = 16_384, 20.0, 40.0
+# Files that can be downloaded at the same time: a new one takes the place of the oldest.
+_MOST_OFFERED = 8
 _CLOSING_S = 0.5
 _ANY = {"0.0.0.0", "::"}
 
@@ -111,6 +115,7 @@ class Server(Closing):
         self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/" + (f"?token={token}" if token else "")
         self._on_message = on_message
         self._latest: dict[str, Message] = {}
+        self._offered: dict[str, tuple[str, bytes]] = {}
         self._pages: list[_Page] = []
         self._started = Event()
         self.thread = Thread(target=self._run, name="thenar web", daemon=True)
@@ -123,6 +128,17 @@ class Server(Closing):
         of its topic is dropped.
         """
         self._latest[topic] = message
+
+    def offer(self, name: str, content: bytes) -> str:
+        """Let pages download `content` as a file called `name`, and return the address to ask for.
+
+        The address is random, and browsers save what is there: they do not show it as a page of this server.
+        """
+        address = f"/offered/{secrets.token_urlsafe(12)}"
+        self._offered[address] = (name, content)
+        for old in list(self._offered)[:-_MOST_OFFERED]:
+            del self._offered[old]
+        return address
 
     @property
     def pages(self) -> int:
@@ -219,6 +235,11 @@ class Server(Closing):
             return _said(403, "Open the full address that thenar printed, including its token.")
         if request.path == "/live":
             return await self._live(request)
+        if offered := self._offered.get(request.path):
+            saved = {
+                "Content-Disposition": f"attachment; filename*=UTF-8''{quote(offered[0], safe='', errors='replace')}"
+            }
+            return web.Response(body=offered[1], content_type="application/octet-stream", headers=HEADERS | saved)
         file = self._files.get(request.path)
         if file is None:
             return _said(404, "There is no such page.")

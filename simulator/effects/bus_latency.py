@@ -33,8 +33,8 @@ def prepare(
     scan_us = there * (us_per_port + jitter_us)
     if scan_us > setting.period_us:
         raise SceneError(
-            f"effects.bus.latency: {there} ports take {scan_us:g} us on average, and the period of frames is"
-            f" {setting.period_us} us: lower us_per_port, jitter_us or recording.rate_hz"
+            f"effects.bus.latency: {there} ports take {scan_us:g} µs on average, and the period of frames is"
+            f" {setting.period_us} µs: lower us_per_port, jitter_us or recording.rate_hz"
         )
     rows = drawn_rows(setting)
 

@@ -60,7 +60,7 @@ def _check_rate(setting: SceneSetting) -> None:
     if setting.timed and setting.period_us < longest:
         raise SceneError(
             f"recording.rate_hz: {1e6 / setting.period_us:g} frames a second are more than the glove's serial lines"
-            f" deliver: one takes {longest} us; request at most {1_000_000 // longest}, or list no wire effects"
+            f" deliver: one takes {longest} µs; request at most {1_000_000 // longest}, or list no wire effects"
         )
 
 

@@ -1,41 +1,40 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
+import { button, interval, percent, storeChoice, storedChoice } from "./choice.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
-const percent = (share) => (100 * share).toFixed(1);
-const interval = ({ mean, low, high }) => `${percent(mean)} % [${percent(low)}, ${percent(high)}]`;
 const KINDS = { switch: "Switches", pad: "Pads", joint: "Joints" };
+const WORK = { reading: "reading", measure: "measuring", curve: "measuring the curve", train: "training" };
 
 let set = null; // the message on the set
-let drawn = null; // the message on the hand
 let hand = null;
-let error = -1; // the place among the misread trials of the one that is shown
 let boxes = [];
 let chosen = []; // numbers of sensors, in the order in which they were chosen
 let shown = null; // the last reply
+let working = null; // what is done now, and when it will be finished
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
   open: () => set && !set.why && choose(chosen),
+  project: ({ sets, state: { aside, took } }) => {
+    listSets(sets, aside);
+    const known = Object.keys(WORK).filter((what) => took[what] !== undefined);
+    say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");
+  },
   set: (message) => {
-    // Another server took the place of ours: its numbers are other sensors.
-    if (set && JSON.stringify(set) !== JSON.stringify(message)) {
-      chosen = [];
-      measured.clear();
-    }
+    if (set && set.numbering !== message.numbering) measured.clear();
     set = message;
-    say($("recordings"), set.name);
     $("empty").hidden = !set.why;
     say($("empty"), set.why);
+    list($("unused"), set.unused ?? []);
     $("with-set").hidden = Boolean(set.why);
     if (set.why) return;
     listSensors();
-    choose(chosen);
+    choose(storedChoice(set.sensors));
   },
-  sensors: (message) => {
-    drawn = message;
+  sensors: (drawn) => {
     $("drawn").hidden = !drawn.switches.length;
     hand = drawHand($("hand"), drawn, { onSwitch: (sensor) => toggle(sensor) });
     mark();
@@ -59,12 +58,45 @@ const ask = openPage({
     say($("build-heading"), `Trained: ${folder}`);
     list($("facts"), facts);
   },
-  work: ({ done, total, what, why }) => {
-    const busy = { reading: "reading", measure: "measuring", curve: "measuring the curve", train: "training" }[what];
-    say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
+  work: ({ done, total, what, why, left_s: left }) => {
+    working = done < total ? { what, share: done / total, end: left == null ? null : performance.now() + 1000 * left } : null;
+    $("cancel").hidden = !working || what === "reading";
+    countDown(why ?? "");
   },
-  trial: (seen) => showTrial(seen),
 });
+
+/** Say how far the work is, and how long it takes still. */
+function countDown(why = "") {
+  if (!working) {
+    say($("work"), why);
+    return;
+  }
+  const { what, share, end } = working, left = end === null ? null : (end - performance.now()) / 1000;
+  const time = left === null ? "" : left > 1 ? `, about ${duration(left)} left` : ", any moment now";
+  say($("work"), `${WORK[what] ?? what}: ${Math.round(100 * share)} %${time}`);
+}
+
+setInterval(() => working && countDown(), 1000);
+
+function duration(seconds) {
+  if (seconds < 10) return `${Math.max(1, Math.round(seconds))} s`;
+  return seconds < 100 ? `${5 * Math.round(seconds / 5)} s` : `${Math.round(seconds / 60)} min`;
+}
+
+function listSets(sets, aside) {
+  const rows = sets.map(({ id, name }) => {
+    const label = document.createElement("label"), box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = !aside.includes(name);
+    box.addEventListener("change", () => ask("use", { id, value: Number(box.checked) }));
+    label.append(box, name);
+    return label;
+  });
+  // A box that stays keeps the focus.
+  const same = String(rows.map((row) => row.textContent)) === String([...$("sets").children].map((row) => row.textContent));
+  if (same) rows.forEach((row, place) => ($("sets").children[place].firstChild.checked = row.firstChild.checked));
+  else $("sets").replaceChildren(...rows);
+}
 
 // A reply to an earlier choice comes too late.
 const isChosen = (sensors) => String(sensors) === String(chosen);
@@ -76,6 +108,7 @@ function toggle(sensor) {
 
 function choose(sensors) {
   chosen = sensors;
+  storeChoice(set.sensors, chosen);
   mark();
   ask("choose", { sensors });
 }
@@ -124,13 +157,7 @@ function show(reply) {
   say($("command"), reply.command || "choose a sensor");
   say($("spoken"), `${chosen.length} sensors, ${percent(reply.mean)} percent`);
   $("measure").disabled = $("train").disabled = !chosen.length;
-  $("trial").hidden = true;
-  $("trials").replaceChildren();
-  error = -1;
-  confusion(reply);
   certify();
-  // After the accuracy is painted: a map may have thousands of marks.
-  setTimeout(() => reply === shown && drawMap(reply));
 }
 
 function scanTime(us) {
@@ -147,7 +174,7 @@ function weakest({ confusion: counts }) {
   );
   if (!worst) return "none";
   const total = counts[worst.truth].reduce((sum, count) => sum + count, 0);
-  return `${set.grasps[worst.truth]} read as ${set.grasps[worst.read]}: ${worst.count} of ${total} trials`;
+  return `${set.grasps[worst.truth]} recognised as ${set.grasps[worst.read]}: ${worst.count} of ${total} trials`;
 }
 
 /** Show the accuracy that was measured for the chosen sensors, if it was. */
@@ -156,161 +183,15 @@ function certify() {
   say($("measured"), found ? `measured in folds: ${interval(found)} ${found.of}; ${found.recipe}` : "");
 }
 
-function confusion({ confusion: counts, misread }) {
-  const head = document.createElement("tr");
-  head.append(document.createElement("td"), ...set.grasps.map((name) => column(name)));
-  const rows = counts.map((row, truth) => {
-    const line = document.createElement("tr");
-    line.append(cell("th", set.grasps[truth]));
-    row.forEach((count, read) => {
-      const made = cell("td", truth === read || !count ? String(count || "") : "");
-      if (truth === read) made.dataset.is = "good";
-      else if (count) {
-        const button = document.createElement("button");
-        button.type = "button";
-        button.textContent = count;
-        button.setAttribute("aria-label", `${count} trials of ${set.grasps[truth]} read as ${set.grasps[read]}`);
-        button.addEventListener("click", () =>
-          listTrials(misread.filter((one) => one.truth === set.grasps[truth] && one.read === set.grasps[read])),
-        );
-        made.append(button);
-      }
-      line.append(made);
-    });
-    return line;
-  });
-  const table = document.createElement("tbody");
-  table.append(head, ...rows);
-  $("confusion").replaceChildren(table);
-}
-
-/* ---- The map of trials ---- */
-
-const SVG = "http://www.w3.org/2000/svg";
-const SHAPES = ["M-4 0a4 4 0 1 0 8 0a4 4 0 1 0 -8 0Z", "M-4-4H4V4H-4Z", "M0-5L5 4H-5Z", "M0-5L5 0L0 5L-5 0Z"];
-const COLOURS = 7;
-
-function glyph(parent, kind) {
-  const made = document.createElementNS(SVG, "path");
-  made.setAttribute("d", SHAPES[Math.floor(kind / COLOURS) % SHAPES.length]);
-  made.classList.add("trial", `kind-${kind % COLOURS}`);
-  parent.append(made);
-  return made;
-}
-
-function drawMap({ map, misread }) {
-  const wrong = new Map(misread.map((one) => [one.trial, one]));
-  const [xs, ys] = [1, 2].map((axis) => map.map((place) => place[axis]));
-  const scale = (values, from, to) => {
-    const low = Math.min(...values), wide = Math.max(...values) - low || 1;
-    return (value) => from + ((value - low) / wide) * (to - from);
-  };
-  const across = scale(xs, 12, 588), down = scale(ys, 388, 12);
-  const marks = map.map(([kind, x, y], trial) => {
-    const group = document.createElementNS(SVG, "g"), title = document.createElementNS(SVG, "title");
-    const error = wrong.get(trial), name = set.grasps[kind];
-    group.setAttribute("transform", `translate(${across(x).toFixed(1)} ${down(y).toFixed(1)})`);
-    title.textContent = `${set.trials[trial]}: ${name}${error ? `, read as ${error.read}` : ""}`;
-    group.append(title);
-    glyph(group, kind);
-    if (error) {
-      const ring = document.createElementNS(SVG, "circle");
-      ring.setAttribute("r", 7);
-      ring.classList.add("ring");
-      group.append(ring);
-    }
-    group.addEventListener("click", () => ask("trial", { trial, sensors: chosen }));
-    return group;
-  });
-  $("map").replaceChildren(...marks);
-  const entries = set.grasps.map((name, kind) => {
-    const item = document.createElement("li"), sign = document.createElementNS(SVG, "svg");
-    sign.setAttribute("viewBox", "-7 -7 14 14");
-    sign.setAttribute("aria-hidden", "true");
-    glyph(sign, kind);
-    item.append(sign, name);
-    return item;
-  });
-  $("legend").replaceChildren(...entries);
-}
-
-function column(name) {
-  const made = cell("th", name);
-  made.scope = "col";
-  return made;
-}
-
-function listTrials(trials) {
-  const items = trials.map(({ trial }) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "plain";
-    button.textContent = set.trials[trial];
-    button.addEventListener("click", () => ask("trial", { trial, sensors: chosen }));
-    return button;
-  });
-  const row = document.createElement("p");
-  row.className = "row";
-  row.append(...items);
-  $("trials").replaceChildren(row);
-  items[0]?.focus();
-}
-
-/** Show what the sensors saw in a trial, next to what they typically see in its true and in its recognised type. */
-function showTrial({ trial, shown: values, truth, read, typical, decisive }) {
-  const [name, other] = [set.grasps[truth], set.grasps[read]];
-  say($("trial-heading"), `${set.trials[trial]}: ${name}${read === truth ? "" : `, read as ${other}`}`);
-  const names = decisive.map((sensor) => set.sensors[sensor].name);
-  say($("decisive"), names.length ? `decided by ${names.join(", ")}` : "");
-  $("trial").hidden = false;
-  const parts = [seen(set.trials[trial], values), seen(`${name}, typically`, typical[0])];
-  if (read !== truth) parts.push(seen(`${other}, typically`, typical[1]));
-  // Before it is on the page, a drawing has no width.
-  $("hands").replaceChildren(...parts.map(({ figure }) => figure));
-  for (const { draw } of parts) draw();
-}
-
-/** Return a figure of what sensors saw: a hand with those closed for more than half of the time, and all joints. */
-function seen(words, values) {
-  const figure = document.createElement("figure"), caption = document.createElement("figcaption");
-  const svg = document.createElementNS(SVG, "svg"), joints = document.createElement("ul");
-  caption.textContent = words;
-  set.sensors.forEach(({ name, kind }, sensor) => {
-    if (kind !== "joint") return;
-    const item = document.createElement("li"), label = document.createElement("label");
-    const meter = document.createElement("meter");
-    meter.value = values[sensor];
-    label.append(meter, `${name} ${Math.round(100 * values[sensor])} %`);
-    item.append(label);
-    joints.append(item);
-  });
-  figure.append(caption, ...(drawn.switches.length ? [svg] : []), joints);
-  const draw = () => {
-    if (!drawn.switches.length) return;
-    drawHand(svg, drawn).setClosed(values.map((value) => value > 0.5));
-    svg.setAttribute("aria-label", `hand: ${words}`);
-  };
-  return { figure, draw };
-}
-
-function nextError(step) {
-  const errors = shown?.misread ?? [];
-  if (!errors.length) return;
-  error = (error + step + errors.length) % errors.length;
-  ask("trial", { trial: errors[error].trial, sensors: chosen });
-}
+/* ---- The curve: what sensors are worth, as a table and as a front of points to click on ---- */
 
 function drawCurve({ points, of, enough }) {
   $("curve-panel").hidden = false;
   say($("curve-of"), `${of}, %`);
   const rows = points.map((point) => {
-    const row = document.createElement("tr"), button = document.createElement("button"), last = cell("td", "");
-    const number = point.sensors.length;
+    const row = document.createElement("tr"), last = cell("td", ""), number = point.sensors.length;
     if (number === enough) row.setAttribute("aria-current", "true");
-    button.type = "button";
-    button.textContent = `Choose these ${number}`;
-    button.addEventListener("click", () => choose(point.sensors));
-    last.append(button);
+    last.append(button(`Choose these ${number}`, () => choose(point.sensors)));
     row.append(
       cell("th", number === enough ? `${number}: more matter little` : String(number)),
       cell("td", `${percent(point.mean)} [${percent(point.low)}, ${percent(point.high)}]`),
@@ -321,6 +202,63 @@ function drawCurve({ points, of, enough }) {
     return row;
   });
   $("points").replaceChildren(...rows);
+  drawFront(points, of);
+  detail(points.find(({ sensors }) => sensors.length === enough), of);
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+const BOX = { left: 46, right: 470, top: 10, bottom: 262 };
+
+function element(name, attributes, parent, text = "") {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.textContent = text;
+  parent.append(made);
+  return made;
+}
+
+function drawFront(points, of) {
+  const svg = $("front"), most = Math.max(...points.map(({ sensors }) => sensors.length));
+  const x = (number) => BOX.left + (number / (most + 0.5)) * (BOX.right - BOX.left);
+  const y = (share) => BOX.bottom - share * (BOX.bottom - BOX.top);
+  svg.replaceChildren();
+  for (const share of [0, 0.25, 0.5, 0.75, 1]) {
+    element("path", { class: "grid", d: `M${BOX.left} ${y(share)}H${BOX.right}` }, svg);
+    element("text", { x: BOX.left - 6, y: y(share) + 4, "text-anchor": "end" }, svg, `${100 * share} %`);
+  }
+  const step = Math.ceil(most / 8);
+  for (let number = step; number <= most; number += step) {
+    element("text", { x: x(number), y: BOX.bottom + 16, "text-anchor": "middle" }, svg, number);
+  }
+  element("text", { x: (BOX.left + BOX.right) / 2, y: BOX.bottom + 33, "text-anchor": "middle" }, svg, "number of sensors");
+  const line = points.map(({ sensors, mean }) => `${x(sensors.length)} ${y(mean)}`).join("L");
+  element("path", { class: "front", d: `M${line}` }, svg);
+  for (const point of points) {
+    const number = point.sensors.length, spot = element("g", { class: "point", role: "button", tabindex: 0 }, svg);
+    spot.setAttribute("aria-label", `${number} sensors: ${interval(point)}`);
+    element("path", { d: `M${x(number)} ${y(point.low)}V${y(point.high)}` }, spot);
+    element("circle", { cx: x(number), cy: y(point.mean), r: 5 }, spot);
+    element("rect", { x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }, spot);
+    spot.addEventListener("click", () => detail(point, of));
+    spot.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      detail(point, of);
+    });
+  }
+}
+
+/** Show what a point of the front is. */
+function detail(point, of) {
+  const number = point.sensors.length;
+  [...$("front").querySelectorAll(".point")].forEach((spot) => {
+    spot.setAttribute("aria-pressed", String(spot.getAttribute("aria-label").startsWith(`${number} sensors`)));
+  });
+  say($("point-heading"), `${number} ${number === 1 ? "sensor" : "sensors"}: ${interval(point)}, ${of}`);
+  say($("point-about"), point.worth && `the last one is worth ${point.worth} points`);
+  say($("point-sensors"), point.sensors.map((sensor) => set.sensors[sensor].name).join(", "));
+  say($("point-choose"), number === 1 ? "Choose this sensor" : `Choose these ${number} sensors`);
+  $("point-choose").onclick = () => choose(point.sensors);
 }
 
 $("add").addEventListener("click", () => ask("add", { sensors: chosen }));
@@ -329,7 +267,4 @@ $("clear").addEventListener("click", () => choose([]));
 $("measure").addEventListener("click", () => ask("measure", { sensors: chosen }));
 $("train").addEventListener("click", () => ask("train", { sensors: chosen }));
 $("curve").addEventListener("click", () => ask("curve"));
-document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (event.key === "n" || event.key === "p") nextError(event.key === "n" ? 1 : -1);
-});
+$("cancel").addEventListener("click", () => ask("cancel"));

@@ -9,6 +9,7 @@ const percent = (share) => (100 * share).toFixed(1);
 const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
 
 let stage = "over";
+let doing = ""; // what the collection is for
 let sensors = 0; // of the project's set, for Train
 let drawn = null; // the message on the glove's hand
 let hand = null;
@@ -82,6 +83,9 @@ function show(state) {
   const before = stage;
   stage = state.stage;
   const over = stage === "over";
+  // It was begun on the page Wearer, which adapts a build to the trials.
+  if (over && doing === "wearer") location.href = "wearer.html";
+  doing = state.doing;
   $("begin").hidden = !over;
   $("leading").hidden = over;
   if (over) return;

@@ -100,6 +100,7 @@ def test_the_base_dependencies_suffice_and_give_the_same_bytes(folder: Path, tmp
     assert done.returncode == 0, done.stderr
     assert 'no firmware: pip install "thenar[compiler]"' in done.stdout
     assert not (tmp_path / "mine" / "firmware").exists()
+    assert not (tmp_path / "mine" / "report.html").exists()
     for name in ("build.json", "tables.bin", "ensemble.bin"):
         assert (tmp_path / "mine" / name).read_bytes() == (folder / "mine" / name).read_bytes()
 
@@ -111,7 +112,7 @@ def test_types_may_be_missing_and_contradictions_are_named(folder: Path, tmp_pat
     both.save(tmp_path / "two.grasps")
     said = thenar("adapt", folder / "build", tmp_path / "two.grasps", "-o", tmp_path / "new")
     assert said.returncode == 0
-    assert "a frame is the same for cup, pen" in said.stderr
+    assert "a frame is the same for cup, pen, in trials 0, 1:" in said.stderr
     assert "no trials of rod" in said.stderr
     # Even a frame that looks like another type is within the limits of its own.
     build = Build.load(tmp_path / "new")

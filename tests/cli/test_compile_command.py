@@ -23,7 +23,7 @@ def test_compile_writes_a_build_and_says_what_it_is(set_file: Path, tmp_path: Pa
     )
     assert "\nfirmware: for atmega328p: about " in done.stdout
     made = {path.name for path in (tmp_path / "build").iterdir()}
-    files = ("build.json", "ensemble.bin", "hand.json", "report.html", "tables.bin", "try.html")
+    files = ("build.json", "ensemble.bin", "hand.json", "report.html", "tables.bin")
     assert made == {*files, "firmware", "spec"}
     core, glove = ("thenar.c", "thenar.h", "thenar_block.h"), ("glove.c", "glove.h", "glove_codes.c", "glove_codes.h")
     made = {path.name for path in (tmp_path / "build" / "firmware").iterdir()}

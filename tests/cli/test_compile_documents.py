@@ -56,7 +56,7 @@ def gloved_file(gloved: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
 def test_no_report_leaves_out_the_report_and_the_spec(gloved_file: Path, tmp_path: Path) -> None:
     done(thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--no-report"))
     made = sorted(path.name for path in (tmp_path / "build").iterdir())
-    assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin", "try.html"]
+    assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin"]
 
 
 def test_the_spec_in_a_build_is_what_spec_writes_of_it(gloved_file: Path, tmp_path: Path) -> None:

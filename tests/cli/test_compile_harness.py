@@ -33,7 +33,7 @@ def test_a_proposed_harness_loads_and_reads_every_kept_switch_at_once(set_file: 
     scan = load_scan(build, Build.load(build).manifest)
     assert scan is not None
     assert len(scan.ports) == 1
-    assert "a whole scan: 1 transaction, 98.8 us on the wire, 100.0 % of the 98.8 us" in " ".join(done.stdout.split())
+    assert "a whole scan: 1 transaction, 98.8 µs on the wire, 100.0 % of the 98.8 µs" in " ".join(done.stdout.split())
     assert thenar("verify", build, set_file).returncode == 0
 
 
@@ -43,7 +43,7 @@ def test_a_scan_is_told_with_its_share_of_the_wiring(set_file: Path, small_set: 
     glove.write_text(harness_to_toml(propose_harness(names)))
     done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
     assert done.returncode == 0, done.stderr
-    assert "20.4 % of the 485.2 us for all 56 wired switches" in " ".join(done.stdout.split())
+    assert "20.4 % of the 485.2 µs for all 56 wired switches" in " ".join(done.stdout.split())
 
 
 def test_a_board_is_proposed_with_a_key_for_every_kept_switch(set_file: Path, tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_streams_are_told_with_their_switches(set_file: Path, small_set: GraspSe
     done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
     assert done.returncode == 0, done.stderr
     kept = len(Build.load(tmp_path / "build").manifest.switches)
-    assert f"stream /dev/ttyACM0: {kept} kept switches, a row every 5000 us" in " ".join(done.stdout.split())
+    assert f"stream /dev/ttyACM0: {kept} kept switches, a row every 5000 µs" in " ".join(done.stdout.split())
 
 
 def test_a_file_is_replaced_only_if_asked(set_file: Path, tmp_path: Path) -> None:

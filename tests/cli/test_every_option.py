@@ -41,6 +41,7 @@ LINES: dict[str, tuple[str, str]] = {
     ),
     "compile": ("set.grasps", "-o new --rounds 2 --folds 0 --no-report"),
     "adapt": ("build set.grasps", "-o new"),
+    "compare": ("build build set.grasps", ""),
     "verify": ("build set.grasps", ""),
     "firmware": ("build", "--target host -o new"),
     "spec": ("build", "-o new"),

@@ -19,7 +19,7 @@ def test_a_point_is_a_line_of_the_table(examples: Any, capsys: pytest.CaptureFix
     assert [line.strip("│").split("│")[0].strip() for line in lines] == [str(number) for number in range(1, 12)]
     assert [cell.strip() for cell in lines[4].strip("│").split("│")] == [
         *("5", "33", "switches", "elimination 33", "100, 8", "mcp23017 1 MHz"),
-        *("92.9 [92.1, 93.7]", "94.7 [94.0, 95.4]", "440 us model", "8,844", "114"),
+        *("92.9 [92.1, 93.7]", "94.7 [94.0, 95.4]", "440 µs model", "8,844", "114"),
     ]
 
 

@@ -2,10 +2,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, merge
+from thenar.compiler.recordings.edits import Edit, apply_edits, read_edits, trials_of
 
 from .conftest import thenar
 
@@ -76,3 +78,24 @@ def test_what_cannot_be_done_is_one_sentence(
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_edits_are_applied_and_what_is_not_there_is_said(files: tuple[Path, Path], tmp_path: Path) -> None:
+    recordings = {path: path.read_bytes() for path in files}
+    first, second, *_ = trials_of("anna.grasps", GraspSet.load(files[0]))
+    log, clean = tmp_path / "edits.jsonl", tmp_path / "clean.grasps"
+    edits = [(first, first[3], ""), (second, second[3], "hook"), (("eva.grasps", *first[1:]), first[3], "")]
+    lines = [msgspec.json.encode(Edit("2026-11-30T12:00:00+00:00", 1, *of, old, new)) for of, old, new in edits]
+    log.write_bytes(b"\n".join(lines) + b'\n{"time"')
+    done = thenar("merge", files[0], files[1], "--edits", log, "-o", clean)
+    assert done.returncode == 0
+    assert f"warning: {log}: line 4, the last, is damaged, and was ignored" in done.stderr
+    assert "of eva.grasps was edited, but is not there" in done.stderr
+    expected, _, _ = apply_edits({str(path): GraspSet.load(path) for path in files}, read_edits(log)[0])
+    assert len(expected) == 119
+    assert GraspSet.load(clean).fingerprint() == expected.fingerprint()
+    assert {path: path.read_bytes() for path in files} == recordings
+    log.write_text("no edit\n\n")
+    done = thenar("merge", *files, "--edits", log, "-o", tmp_path / "other.grasps")
+    assert (done.returncode, (tmp_path / "other.grasps").exists()) == (2, False)
+    assert f"{log}: line 1 is no edit: " in done.stderr

@@ -76,7 +76,8 @@ def test_a_build_its_report_and_its_spec_are_of_this_glove(grasps: Path, layout:
     worked(thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout, "--glove", glove))
     report = (build / "report.html").read_text()
     assert "Joints flex_thumb, flex_index need a source of your own" in report
-    assert report.count('class="dot') >= len(PADS)
+    page = json.loads(re.findall(r'id="page-data">(.*?)</script>', report)[0])
+    assert len(page["hand"]["switches"]) >= len(PADS)
     said = worked(thenar("spec", build, "--layout", layout, "-o", tmp_path / "spec"))
     assert "your own switch or pad" in said
     assert "need a source of your own" in said

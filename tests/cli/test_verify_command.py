@@ -115,9 +115,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
         "firmware, on 4 rows, 3 extreme and 3 random frames:",
         "  atmega328p: 2 of 10 frames DIFFER; the first:",
         "    3 of the grasp types have ANOTHER NAME",
-        "    row 3: closed s1; codes 7 8",
-        "    Python: cup, scores 5 4, margin 1, probability 40000 of 65535",
-        "    compiled: pen, scores 5 6, margin 1, probability 40001 of 65535",
+        "    row 3: Python cup, scores 5 4; compiled pen, scores 5 6; --json has the frame",
         "  the build carries no firmware",
     ]
     assert verdict(found).endswith("a bug of thenar or of the compiler: report it, with the first frame shown")

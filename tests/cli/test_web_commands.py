@@ -91,12 +91,14 @@ def test_a_page_of_a_run_shows_it_and_takes_no_requests(
 ) -> None:
     run, before = start("run", build_folder, "--glove", glove, "--web", "127.0.0.1:0"), set(tmp_path.rglob("*"))
     with run.page() as live:
+        assert told(live, "shell")["project"] == "glove <b>"
         build = told(live, "build")
-        assert (build["name"], build["grasps"], build["replay"]) == ("glove <b>", ["cup", "pen", "rod", "none"], False)
+        assert (build["name"], build["grasps"]) == (build_folder.name, ["cup", "pen", "rod", "none"])
         assert told(live, "hand")["switches"]
         frame = told(live, "frame")
         assert (frame["grasp"], frame["probabilities"]) == ("unknown", None)
         assert told(live, "health")["devices"][0]["error"]
+        assert told(live, "glove", lambda glove: "not connected" in glove["words"])["is"] == "bad"
         ask(live, do="record", name="one")
         assert told(live, "refused")["why"] == "this page takes no requests"
     assert run.end() == 0
@@ -151,32 +153,59 @@ def recording(build_folder: Path, glove: Path, tmp_path: Path) -> Path:
     return path
 
 
-def test_a_recording_is_shown_from_any_moment_of_it(
+def test_a_recording_is_shown_from_any_moment_of_it_to_each_page(
     start: Callable[..., Command], build_folder: Path, recording: Path
 ) -> None:
     monitor = start("monitor", recording, "--build", build_folder, "--web", "127.0.0.1:0")
-    with monitor.page() as live:
-        assert told(live, "build")["name"] == "run.mcap"
-        assert told(live, "hand")["switches"]
-        state = told(live, "replay", lambda state: state["share"] == 1)
-        assert (state["playing"], state["speed"], state["truth"], state["faults"]) == (False, 1.0, None, [])
-        assert told(live, "overview")["predictions"][0][1] == "unknown"
-        ask(live, do="seek", value=state["last_us"])
-        assert told(live, "frame", lambda frame: frame["number"] == 19)["time_us"] == state["last_us"]
-        ask(live, do="seek", value=0)
-        assert told(live, "frame", lambda frame: frame["number"] == 0)["grasp"] == "unknown"
-        ask(live, do="speed", value=10)
-        ask(live, do="play")
-        told(live, "frame", lambda frame: frame["number"] == 19)
-        told(live, "replay", lambda state: not state["playing"])
-        for wrong in ({"do": "seek", "value": "x"}, {"do": "seek", "value": 2**70}, {"do": "seek", "value": True}):
-            ask(live, **wrong)
-            assert "a moment must be a number of microseconds" in told(live, "refused")["why"]
-        ask(live, do="speed", value=1e9)
-        assert "a speed must be one of 0.1, 0.25" in told(live, "refused")["why"]
+    with monitor.page() as live, monitor.page() as other:
+        assert told(live, "shell")["project"] == "run.mcap"
+        about = told(live, "replay")
+        assert (about["name"], about["builds"]) == ("run.mcap", [build_folder.name])
+        assert about["hand"]["switches"]
+        overview: dict[str, Any] = {"share": 0.0}
+        while overview["share"] < 1:
+            ask(live, do="overview", numbers=[0, 0])
+            overview = told(live, "overview")
+        assert (overview["truth"], overview["faults"]) == ([], [])
+        assert overview["changes"][0][0][1] == "unknown"
+        first, last = overview["first_us"], overview["last_us"]
+        ask(live, do="moments", numbers=[first, last, 1])
+        frames = told(live, "moments")["frames"]
+        assert (frames[0]["number"], frames[-1]["number"], frames[-1]["time_us"]) == (0, 19, last)
+        assert len(frames) <= 20
+        # The other page has asked for nothing.
+        assert [json.loads(other.recv(timeout=PATIENCE_S))["topic"] for _ in range(2)] == ["shell", "replay"]
+        ask(other, do="moments", numbers=[first, first, 1])
+        while (reply := json.loads(other.recv(timeout=PATIENCE_S)))["topic"] != "moments":
+            assert reply["topic"] in ("shell", "replay")
+        assert [frame["number"] for frame in reply["frames"]] == [0]
+        ask(live, do="moments", numbers=[first, "x", 1])
+        assert "for the moments of a recording, a page must send 3 whole numbers" in told(live, "refused")["why"]
+        ask(live, do="moments")
+        assert told(live, "refused")["do"] == "moments"
         ask(live, do="delete")
-        assert "a page can request seek, play, pause or a speed, not 'delete'" in told(live, "refused")["why"]
+        assert (
+            "a page can ask for the overview or for moments of a recording, not 'delete'"
+            in told(live, "refused")["why"]
+        )
     assert monitor.end() == 0
+
+
+def test_two_builds_stand_side_by_side_and_three_are_too_many(
+    start: Callable[..., Command], build_folder: Path, recording: Path
+) -> None:
+    builds = ("--build", build_folder, "--build", build_folder)
+    monitor = start("monitor", recording, *builds, "--web", "127.0.0.1:0")
+    with monitor.page() as live:
+        # Of the same name, they are told apart by their paths.
+        assert told(live, "replay")["builds"] == [str(build_folder)] * 2
+        ask(live, do="overview", numbers=[0, 0, 0])
+        one, other = told(live, "overview")["changes"]
+        assert one == other
+    assert monitor.end() == 0
+    done = thenar("monitor", recording, *builds, *builds)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "a page shows two builds at most: leave out a --build" in done.stderr
 
 
 @pytest.fixture

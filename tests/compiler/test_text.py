@@ -29,7 +29,7 @@ def test_rates_have_one_digit_and_a_missing_one_is_a_dash() -> None:
 @pytest.mark.parametrize(
     ("us", "said"),
     [
-        *((0.0, "0 us"), (61.54, "61.5 us"), (440, "440 us"), (999.4, "999 us")),
+        *((0.0, "0 µs"), (61.54, "61.5 µs"), (440, "440 µs"), (999.4, "999 µs")),
         *((999.6, "1 ms"), (2052, "2.05 ms"), (1.5e6, "1.5 s")),
     ],
 )

@@ -159,8 +159,8 @@ def test_frames_of_two_types_are_named() -> None:
     mine = adaptation("bits", frames=1)
     bits, codes = mine.bits.copy(), mine.codes.copy()
     bits[1], codes[1] = bits[0], codes[0]
-    assert replace(mine, bits=bits, codes=codes).contradictions == [(0, 1)]
-    assert mine.contradictions == []
+    assert replace(mine, bits=bits, codes=codes).contradictions == {(0, 1): {0, 1}}
+    assert mine.contradictions == {}
 
 
 def test_correlations_are_those_of_numpy() -> None:

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from selenium import webdriver
 
+from thenar.compiler.artifact.compile import compile_build
+from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.recipe import Recipe
 from thenar.simulator.handmaps.handmap import hand_map
 from thenar.studio import Project, Studio, open_studio
 
 from ..browser import Browser
-from ..sets import grasp_set_of
+from ..sets import grasp_set_of, single_settings
 
 
 @pytest.fixture(scope="session")
@@ -36,6 +39,20 @@ def people(hand: HandShape) -> GraspSet:
     return grasp_set_of(
         ["cup", "pen", "rod"], labels, switches=told, switch_names=names, codes=codes, subjects=subjects
     )
+
+
+@pytest.fixture(scope="session")
+def two_builds(people: GraspSet, hand: HandShape, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with two builds of the recordings of the first two people: "few" reads three sensors, "more"
+    four, and they share two.
+    """
+    folder, names = tmp_path_factory.mktemp("builds"), (*people.switch_names, *people.joint_names)
+    known = people.rows(np.isin(people.subjects, ["A", "B"]))
+    with single_settings():
+        for name, sensors in (("few", (0, 1, 2)), ("more", (1, 2, 3, 8))):
+            recipe = Recipe(sensors=len(sensors), have=tuple(names[one] for one in sensors), trainer="logit")
+            compile_build(known, folder / name, recipe, documents=Documents(hand), jobs=1)
+    return folder
 
 
 @pytest.fixture

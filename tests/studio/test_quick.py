@@ -1,6 +1,5 @@
 """The quick accuracy of sensors, compared with discriminants by scipy, row by row."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.placement.logistic import lines
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.recipe import Recipe
-from thenar.studio.quick import SHRINKAGE, QuickAccuracy
+from thenar.studio.quick import SHRINKAGE, Quick, QuickAccuracy
 
 
 @pytest.fixture(scope="module")
@@ -59,18 +58,24 @@ def test_a_row_is_read_as_the_type_of_the_largest_density(
     assert np.array(found.confusion).tolist() == confusion.tolist()
     assert found.mean == np.trace(confusion) / 72
     assert found.low <= found.mean <= found.high
-    assert len(found.misread) == 72 - np.trace(confusion)
+    assert len(misread(quick, found)) == 72 - np.trace(confusion)
     assert quick.of(sensors[::-1]) == found
+
+
+def misread(quick: QuickAccuracy, found: Quick) -> list[int]:
+    """Return the numbers of trials that are recognised as another type."""
+    return [int(trial) for trial in np.flatnonzero(np.array(found.read) != quick.truth)]
 
 
 def test_misread_trials_are_those_of_the_matrix(people: GraspSet, quick: QuickAccuracy) -> None:
     found = quick.of([0, 1])
-    assert found.misread
-    for one in found.misread:
-        assert one.truth == people.grasps[one.trial]
-        assert one.read != one.truth
-        counted = sum((other.truth, other.read) == (one.truth, one.read) for other in found.misread)
-        assert found.confusion[quick.grasps.index(one.truth)][quick.grasps.index(one.read)] == counted
+    wrong = misread(quick, found)
+    assert wrong
+    for one in wrong:
+        truth, read = quick.truth[one], found.read[one]
+        assert people.grasps[one] == quick.grasps[truth]
+        counted = sum((quick.truth[other], found.read[other]) == (truth, read) for other in wrong)
+        assert found.confusion[truth][read] == counted
 
 
 def test_the_best_next_and_the_least_are_those_of_all_trials(quick: QuickAccuracy) -> None:
@@ -112,21 +117,12 @@ def test_on_the_map_types_are_as_far_apart_as_scikit_learn_finds_them(people: Gr
     X = np.concatenate([samples.switches.T, lines(samples.codes)]).T[:, sensors]
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("thenar.studio.quick.SHRINKAGE", 0.0)
-        found = np.array([place[1:] for place in quick.of(sensors).map])
+        found = quick.places(sensors)
     # Equal shares, so the mean of the types' means is that of all rows.
     expected = LinearDiscriminantAnalysis(solver="svd").fit(X, samples.labels).transform(X)
     for axis in range(2):
         assert abs(np.corrcoef(found[:, axis], expected[:, axis])[0, 1]) > 0.999
-    assert [place[0] for place in quick.of(sensors).map] == samples.labels.tolist()
-
-
-def test_a_trial_has_the_number_of_the_recordings(people: GraspSet) -> None:
-    """Also after rows in which nothing is held."""
-    grasps = people.grasps.copy()
-    grasps[:12] = "none"
-    quick = QuickAccuracy(replace(people, grasps=grasps, trials=1000 + people.trials))
-    assert quick.trials[0] == "trial 1012 of A, thing"
-    assert len(quick.trials) == 60
+    assert quick.truth.tolist() == samples.labels.tolist()
 
 
 def test_no_sensor_reads_the_most_frequent_type(quick: QuickAccuracy) -> None:
@@ -135,23 +131,26 @@ def test_no_sensor_reads_the_most_frequent_type(quick: QuickAccuracy) -> None:
 
 def test_a_trial_shows_its_switches_and_joints_and_what_decided(people: GraspSet, quick: QuickAccuracy) -> None:
     sensors = [0, 1, 8]
-    one = quick.of(sensors).misread[0]
-    seen = quick.trial(one.trial, sensors)
-    assert (quick.grasps[seen.truth], quick.grasps[seen.read]) == (one.truth, one.read)
-    assert seen.shown[:8] == tuple(people.switches[one.trial].astype(float))
+    found = quick.of(sensors)
+    trial = misread(quick, found)[0]
+    truth, read = int(quick.truth[trial]), found.read[trial]
+    seen = quick.seen(trial)
+    assert seen[:8].tolist() == people.switches[trial].astype(float).tolist()
     low, high = people.codes.min(axis=0), people.codes.max(axis=0)
-    assert seen.shown[8:] == pytest.approx((people.codes[one.trial] - low) / (high - low), abs=5e-3)
-    for kind, typical in zip((one.truth, one.read), seen.typical, strict=True):
-        shares = people.switches[people.grasps == kind].mean(axis=0)
-        assert typical[:8] == pytest.approx(shares, abs=1e-3)
+    assert seen[8:] == pytest.approx((people.codes[trial] - low) / (high - low), abs=5e-3)
+    for kind in (truth, read):
+        shares = people.switches[people.grasps == quick.grasps[kind]].mean(axis=0)
+        assert quick.typical[kind][:8] == pytest.approx(shares, abs=1e-3)
     # By the inverse of the scatter, the share of each sensor in the difference of both types' scores.
     samples = samples_of(people, Recipe())
     X = np.concatenate([samples.switches.T, lines(samples.codes)]).T[:, sensors]
-    others = samples.subjects != samples.subjects[one.trial]
+    others = samples.subjects != samples.subjects[trial]
     means, scatter = discriminant(X[others], samples.labels[others])
-    between = means[seen.read] - means[seen.truth]
-    shares = np.linalg.inv(scatter) @ between * (X[one.trial] - (means[seen.read] + means[seen.truth]) / 2)
-    assert seen.decisive == tuple(sensors[place] for place in np.argsort(-shares) if shares[place] > 0)
+    between = means[read] - means[truth]
+    shares = np.linalg.inv(scatter) @ between * (X[trial] - (means[read] + means[truth]) / 2)
+    assert quick.decisive(trial, sensors) == [sensors[place] for place in np.argsort(-shares) if shares[place] > 0]
+    right = int(np.flatnonzero(np.array(found.read) == quick.truth)[0])
+    assert quick.decisive(right, sensors) == []
 
 
 @pytest.mark.parametrize("sensors", [[10], [-1], [0, 99]])
@@ -159,4 +158,6 @@ def test_a_sensor_that_does_not_exist_is_refused(quick: QuickAccuracy, sensors: 
     with pytest.raises(EvaluationError, match="there are 10 sensors"):
         quick.of(sensors)
     with pytest.raises(EvaluationError, match="there are 72 trials"):
-        quick.trial(72, [])
+        quick.decisive(72, [])
+    with pytest.raises(EvaluationError, match="there are 72 trials"):
+        quick.seen(-1)

@@ -1,6 +1,6 @@
 // The page: one state of all inputs, from the hand or from a recorded row; and its prediction.
 
-const data = JSON.parse(document.getElementById("try-data").textContent);
+const data = JSON.parse(document.getElementById("page-data").textContent);
 const at = (id) => document.getElementById(id);
 const bytes = Uint8Array.from(atob(data.tables), (letter) => letter.charCodeAt(0));
 const recogniser = new Recogniser(parseTables(bytes), data.classes, data.refusal);
@@ -122,8 +122,9 @@ let timer = null;
 const slider = at("row");
 
 function counted(title) {
-  const known = rows.filter((row) => row.truth !== null);
-  const right = known.filter((row) => predictionOf(row) === row.truth).length;
+  for (const row of rows) row.wrong = row.truth !== null && predictionOf(row) !== row.truth;
+  const known = rows.filter((row) => row.truth !== null), right = known.filter((row) => !row.wrong).length;
+  at("misread").disabled = right === known.length;
   at("rows-said").textContent = rows.length
     ? `${title}: ${rows.length} rows${known.length ? `, of ${known.length} with a known grasp ${right} are recognised` : ""}.`
     : `${title}: no rows.`;
@@ -159,6 +160,18 @@ for (const [id, step] of [["before", -1], ["after", 1]]) {
     showRow();
   });
 }
+function nextMisread() {
+  pause();
+  const first = at("truth").textContent ? slider.valueAsNumber + 1 : 0;
+  const order = rows.map((_, step) => (first + step) % rows.length), found = order.find((number) => rows[number].wrong);
+  if (found === undefined) return;
+  slider.value = found;
+  showRow();
+}
+at("misread").addEventListener("click", nextMisread);
+addEventListener("keydown", (event) => {
+  if (event.key === "n" && !event.ctrlKey && !event.altKey && !event.metaKey && !at("try").hidden) nextMisread();
+});
 at("play").addEventListener("click", () => {
   if (timer !== null) return pause();
   at("play").textContent = "Pause";

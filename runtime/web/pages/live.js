@@ -1,28 +1,62 @@
-// The page of a run, or of its recording: shows messages and sends requests.
+// The page of a run, or of a recording: hands messages on, and sends requests.
 import { Replay } from "./replay.js";
 import { openPage } from "./shell.js";
+import { Timeline } from "./timeline.js";
 import { View } from "./view.js";
 
-
 const $ = (id) => document.getElementById(id);
+// In the studio the address names a recording, and the builds to compare on it.
+const ids = new URLSearchParams(location.search).getAll("id");
 const view = new View();
-const replay = new Replay(view, (what, value) => ask(what, { value }));
+const timeline = new Timeline($("timeline"), {
+  moved: () => !timeline.live && replay.moved(),
+  toggle: () => (timeline.live ? timeline.seek(timeline.at === null ? timeline.last - 1 : null) : replay.toggle()),
+});
+const replay = new Replay(view, timeline, (what, numbers) => ask(what, { numbers, ids }));
+let build = null;
+let studio = null; // its controls
 
 const ask = openPage({
-  open: () => view.state.link(true),
+  open: () => {
+    view.state.link(true);
+    if (ids.length) ask("replay", { ids });
+  },
   closed: () => view.state.link(false),
-  build: (build) => {
-    view.build(build);
-    $("replay-panel").hidden = $("truth").hidden = !build.replay;
-    $("main").classList.toggle("replay", Boolean(build.replay));
+  ...(ids.length ? {} : { build: begin, hand: (hand) => view.setHand(hand), past, frame, health: (report) => view.health(report) }),
+  replay: (recording) => {
+    for (const one of document.querySelectorAll("[data-of]")) one.hidden = one.dataset.of !== "recording";
+    $("beside").hidden = recording.builds.length < 2;
+    begin(recording, false);
+    view.setHand(recording.hand);
+    replay.begin(recording);
   },
-  hand: (hand) => view.setHand(hand),
-  past: (past) => view.past(past),
-  frame: (frame) => {
-    view.take(frame);
-    replay.judge();
-  },
-  health: (report) => view.health(report),
   overview: (overview) => replay.overview(overview),
-  replay: (state) => replay.show(state),
+  moments: (moments) => replay.moments(moments),
+  project: (project) => steer((page) => page.project(project)),
+  station: (station) => steer((page) => page.station(station)),
 });
+
+function begin(about, live = true) {
+  if (live && build !== null && build !== about.name) view.tell(`The run goes on with ${about.name}, before it was ${build}.`);
+  build = about.name;
+  timeline.types(about.grasps);
+  view.build(about, live);
+}
+
+function past({ changes, until_us }) {
+  timeline.past(changes, until_us);
+}
+
+function frame(message) {
+  const { time_us, grasp, health, state, segment_type, segment_us } = message;
+  const began = state === "held" || state === "releasing" ? segment_us : null;
+  const trouble = health === "degraded" || health === "unknown" ? health : "";
+  timeline.follow(time_us, [time_us, grasp, trouble, began === null ? "" : segment_type, began], message.unix_us);
+  view.take(message);
+}
+
+// The studio has a file for its controls.
+async function steer(use) {
+  studio ??= import("./steer.js").then(({ Steer }) => new Steer($("steer"), ids, ask));
+  use(await studio);
+}

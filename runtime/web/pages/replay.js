@@ -1,163 +1,198 @@
-// The recording on its page: the position in it, and truth and predictions on one timeline.
-import { drawLanes } from "./timeline.js";
+// A recording on its page: this page's position in it, which plays here, and what it asks the server for.
+import { differs, spanAt, Track } from "./timeline.js";
 import { say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
-
-// "unknown" is no prediction, so it is not wrong.
-const differs = (grasp, truth) => grasp !== truth && grasp !== "unknown";
-
-const clock = (seconds) => {
-  const whole = Math.max(seconds, 0), hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
-  const rest = (whole % 60).toFixed(1).padStart(4, "0");
-  return `${hours ? `${hours}:${String(minutes).padStart(2, "0")}` : minutes}:${rest}`;
-};
+const ASK_MS = 80, LATER_MS = 500; // the server takes 20 requests a second
+const AHEAD_US = 1_000_000, STEP_US = 33_000; // of moments asked for at once, at normal speed
 
 export class Replay {
   #view;
+  #timeline;
   #ask;
-  #state = null; // null: the page is of a run
-  #spans = { truth: [], predictions: [], wrong: [] };
-  #held = false; // while the slider is dragged, messages do not move it
-  #wanted = null; // the requested moment, until the position has changed
-  #timer = null;
+  #labels = new Map(); // spans by the number of their trial
+  #counts = [];
+  #moments = { from: 0, to: -1, frames: [] };
+  #next = null; // the moments after these
+  #asking = false; // for moments
+  #asked = 0;
+  #playing = false;
+  #before = 0;
+  #share = 0;
+  #wanted = linked(); // the time of the address, until it was read
 
-  /** @param {function(string, *): void} ask sends a request and its value */
-  constructor(view, ask) {
-    this.#view = view;
-    this.#ask = ask;
-    $("at").addEventListener("pointerdown", () => (this.#held = true));
-    for (const end of ["pointerup", "pointercancel", "blur"]) $("at").addEventListener(end, () => (this.#held = false));
-    $("at").addEventListener("input", () => this.#seek(Number($("at").value)));
-    $("play").addEventListener("click", () => this.#toggle());
-    $("speed").addEventListener("change", () => ask("speed", Number($("speed").value)));
-    $("whole").addEventListener("click", (event) => {
-      const box = $("whole").getBoundingClientRect();
-      this.#seek(((event.clientX - box.left) / box.width) * Number($("at").max));
-    });
-    addEventListener("resize", () => this.#draw());
-    addEventListener("keydown", (event) => this.#key(event));
+  /** @param {function(string, number[]): boolean} ask asks for the "overview" or for "moments" */
+  constructor(view, timeline, ask) {
+    [this.#view, this.#timeline, this.#ask] = [view, timeline, ask];
+    $("play").addEventListener("click", () => this.toggle());
+    addEventListener("hashchange", () => this.#link(linked()));
   }
 
-  /** Take the predictions and labels of the whole recording. */
-  overview({ predictions, truth }) {
-    const span = ([from, to, name]) => ({ from, to, name });
-    this.#spans.truth = truth.map(span);
-    this.#spans.predictions = predictions.map(([from, name], at) => span([from, predictions[at + 1]?.[0] ?? Infinity, name]));
-    this.#spans.wrong = this.#wrong();
-    this.#draw();
+  /** Begin, or begin again after the server came back: the position stays. */
+  begin({ builds }) {
+    this.#timeline.live = false;
+    this.#timeline.tracks = builds.map((name) => new Track(builds.length > 1 ? name : ""));
+    this.#labels.clear();
+    this.#counts = [...builds, ""].map(() => 0);
+    [this.#asking, this.#next] = [false, null];
+    this.#ask("overview", this.#counts);
+    this.moved();
   }
 
-  /** Take the position in it. */
-  show(state) {
-    const { at_us, first_us, last_us, playing, speed, share, faults } = state;
-    const moved = at_us !== this.#state?.at_us;
-    this.#state = state;
-    if (this.#timer === null && (moved || at_us === this.#wanted)) this.#wanted = null;
-    const slider = $("at"), length = (last_us - first_us) / 1e6, at = (at_us - first_us) / 1e6;
-    this.#view.state.data(at_us, 0);
-    slider.max = String(length);
-    if (!this.#held && this.#wanted === null) slider.value = String(at);
-    slider.setAttribute("aria-valuetext", `${clock(at)} of ${clock(length)}`);
-    say($("place"), `${clock(at)} of ${clock(length)}, ${new Date(at_us / 1000).toLocaleString()}`);
-    say($("play"), playing ? "Pause" : "Play");
-    $("speed").value = String(speed);
-    this.judge();
+  /** Take what was read since. */
+  overview({ have, changes, truth, first_us, last_us, share, faults }) {
+    if (String(have) !== String(this.#counts)) return;
+    const { tracks } = this.#timeline, lists = [...changes, truth];
+    changes.forEach((some, number) => some.forEach((change) => tracks[number].take(change)));
+    for (const [trial, from, to, name] of truth) {
+      if (name) this.#labels.set(trial, { from, to, name });
+      else this.#labels.delete(trial);
+    }
+    this.#timeline.truth = [...this.#labels.values()].sort((one, other) => one.from - other.from);
+    this.#counts = have.map((count, number) => count + lists[number].length);
+    this.#share = share;
     say($("scanned"), share < 1 ? `${Math.floor(100 * share)} % of the file is read` : "");
     say($("faults"), faults.join(" "));
-    this.#draw();
-  }
-
-  /** Compare the prediction with the label, in words and by a sign. */
-  judge() {
-    const truth = this.#state?.truth ?? null, grasp = this.#view.frame?.grasp ?? "unknown";
-    const bad = truth !== null && differs(grasp, truth);
-    say($("truth"), truth === null ? "Truth: no label" : bad ? `✗ Truth: ${truth}, predicted: ${grasp}` : `Truth: ${truth}`);
-    for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
-  }
-
-  // The spans in which a label has another prediction.
-  #wrong() {
-    const { truth, predictions } = this.#spans, found = [];
-    let first = 0;
-    for (const { from, to, name } of truth) {
-      while (predictions[first]?.to <= from) first++;
-      for (let at = first; predictions[at]?.from < to; at++) {
-        const one = predictions[at];
-        const span = { from: Math.max(one.from, from), to: Math.min(one.to, to), name: "✗", colour: "bad" };
-        if (differs(one.name, name)) found.push(span);
-      }
+    if (first_us !== null) {
+      for (const track of tracks) track.untilUs = last_us;
+      this.#timeline.recorded(first_us, Math.max(last_us, first_us + 1));
+      this.#link(this.#wanted);
+      if (this.#timeline.at === null) this.#timeline.seek(first_us);
+      else this.moved();
+      this.#rate();
     }
-    return found;
+    const more = lists.some((list) => list.length);
+    if (share < 1 || more) setTimeout(() => this.#ask("overview", this.#counts), more ? ASK_MS : LATER_MS);
   }
 
-  #toggle() {
-    this.#ask(this.#state?.playing ? "pause" : "play");
+  /** Take moments. */
+  moments({ from_us, to_us, frames }) {
+    this.#asking = false;
+    const got = { from: from_us, to: to_us, frames };
+    if (this.#playing && from_us === this.#moments.to + 1) this.#next = got;
+    else [this.#moments, this.#next] = [got, null];
+    this.#show();
+    if (frames.length) this.#fetch(); // or it was not read yet
   }
 
-  // Only the newest requested position matters: one request at a time is pending.
-  #seek(seconds) {
-    const state = this.#state;
-    if (!state) return;
-    this.#wanted = Math.min(Math.max(Math.round(state.first_us + 1e6 * seconds), state.first_us), state.last_us);
-    this.#timer ??= setTimeout(() => {
-      this.#timer = null;
-      this.#ask("seek", this.#wanted);
-    }, 60);
+  /** Play, or pause. */
+  toggle() {
+    const { at, last, first } = this.#timeline;
+    this.#playing = !this.#playing && at !== null;
+    say($("play"), this.#playing ? "Pause" : "Play");
+    if (!this.#playing) {
+      this.#address();
+      return;
+    }
+    if (at >= last) this.#timeline.seek(first);
+    this.#before = performance.now();
+    requestAnimationFrame((now) => this.#play(now));
   }
 
-  #step(seconds) {
-    this.#seek(((this.#wanted ?? this.#state.at_us) - this.#state.first_us) / 1e6 + seconds);
+  /** The cursor was moved. */
+  moved() {
+    this.#show();
+    this.#fetch();
+    clearTimeout(this.settled);
+    if (!this.#playing) this.settled = setTimeout(() => this.#address(), LATER_MS);
   }
 
-  // Go to the next label or prediction, or to the previous one.
-  #jump(by) {
-    const { at_us, first_us } = this.#state, { truth, predictions } = this.#spans;
-    const places = (truth.length ? truth : predictions).map(({ from }) => from).sort((one, other) => one - other);
-    const next = by > 0 ? places.find((from) => from > at_us + 1000) : places.findLast((from) => from < at_us - 1000);
-    if (next !== undefined) this.#seek((next - first_us) / 1e6);
+  #play(now) {
+    if (!this.#playing) return;
+    requestAnimationFrame((next) => this.#play(next));
+    const { at, last } = this.#timeline, us = Math.min(at + (now - this.#before) * 1000 * this.#speed, last);
+    this.#before = now;
+    if (this.#next && us > this.#moments.to) [this.#moments, this.#next] = [this.#next, null];
+    // It waits for moments that have not come yet.
+    if (this.#covers(us)) this.#timeline.seek(us);
+    if (at >= last && this.#share === 1) this.toggle();
   }
 
-  #key(event) {
-    const typing = /^(SELECT|BUTTON)$/.test(event.target.tagName);
-    if (!this.#state || event.ctrlKey || event.altKey || event.metaKey || typing) return;
-    const keys = {
-      " ": () => this.#toggle(),
-      k: () => this.#toggle(),
-      j: () => this.#step(-10),
-      l: () => this.#step(10),
-      ",": () => this.#step(-0.02),
-      ".": () => this.#step(0.02),
-      ArrowLeft: () => this.#step(-1),
-      ArrowRight: () => this.#step(1),
-      Home: () => this.#seek(0),
-      End: () => this.#seek(Infinity),
-      n: () => this.#jump(1),
-      p: () => this.#jump(-1),
-    };
-    const found = keys[event.key];
-    if (!found) return;
-    event.preventDefault();
-    if (event.target === $("at")) this.#held = false;
-    found();
+  get #speed() {
+    return Number($("speed").value);
   }
 
-  #draw() {
-    if (!this.#state) return;
-    const { at_us, first_us, last_us } = this.#state, { truth, predictions, wrong } = this.#spans;
-    const names = [...new Set([...truth, ...predictions].map(({ name }) => name))];
-    const types = (this.#view.timeline.types.length ? this.#view.timeline.types : names).filter((name) => name !== "none");
-    const lanes = [
-      { name: "truth", spans: truth },
-      { name: "prediction", spans: predictions },
-      { name: "wrong: another type than the truth", spans: wrong },
-    ];
-    const drawn = drawLanes($("whole"), lanes, first_us, Math.max(last_us, first_us + 1), types);
-    if (drawn === null) return;
-    const { pen, x, high, style } = drawn;
-    pen.fillStyle = style.text;
-    pen.fillRect(x(at_us) - 1, 0, 2, high);
-    const counts = `${truth.length} labelled spans, ${predictions.length} predictions, wrong in ${wrong.length} spans`;
-    $("whole").setAttribute("aria-label", `Truth and prediction of ${clock((last_us - first_us) / 1e6)}: ${counts}`);
+  #covers(us) {
+    return us >= this.#moments.from && us <= this.#moments.to;
+  }
+
+  // Show the moment at the cursor, if it has come, and compare it with the label.
+  #show() {
+    const { at, truth, tracks } = this.#timeline;
+    if (at === null || !this.#covers(at) || !this.#moments.frames.length) return;
+    const frame = this.#moments.frames.findLast(({ time_us }) => time_us <= at) ?? this.#moments.frames[0];
+    const label = spanAt(truth, at)?.name ?? null, [, other] = tracks;
+    this.#view.take(frame);
+    const bad = label !== null && differs(frame.grasp, label);
+    say($("truth"), label === null ? "Truth: no label" : bad ? `✗ Truth: ${label}, predicted: ${frame.grasp}` : `Truth: ${label}`);
+    for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
+    if (!other) return;
+    const second = spanAt(other.announced, at)?.name ?? "nothing", wrong = label !== null && differs(second, label);
+    say($("beside"), `${wrong ? "✗ " : ""}${other.name}: ${second}`);
+    $("beside").classList.toggle("wrong", wrong);
+  }
+
+  // Ask for the moments at the cursor, or for those after the present ones; one request at a time.
+  #fetch() {
+    if (this.#asking || this.#missing() === null) return;
+    this.#asking = true;
+    setTimeout(() => {
+      const from = this.#missing(), ahead = Math.round(AHEAD_US * this.#speed), step = Math.round(STEP_US * this.#speed);
+      this.#asked = performance.now();
+      this.#asking = from !== null && this.#ask("moments", [from, from + ahead, step]);
+    }, Math.max(ASK_MS - (performance.now() - this.#asked), 0));
+  }
+
+  // The time from which moments are missing now.
+  #missing() {
+    const { at, last } = this.#timeline, { to } = this.#moments;
+    if (at === null) return null;
+    if (!this.#covers(at)) return at;
+    const soon = this.#playing && !this.#next && to < last && at + (AHEAD_US / 2) * this.#speed > to;
+    return soon ? to + 1 : null;
+  }
+
+  // Say how many labelled trials each build recognises: a trial is right if its type was announced for longest.
+  #rate() {
+    const { truth, tracks } = this.#timeline;
+    const right = tracks.map(({ announced, untilUs }) => truth.map((span) => longest(announced, span, untilUs) === span.name));
+    const words = right.map((found, number) => {
+      const count = found.filter(Boolean).length, name = tracks[number].name || "This build";
+      return `${name} recognises ${count} of ${truth.length} labelled trials, ${((100 * count) / truth.length).toFixed(0)} %.`;
+    });
+    if (right.length > 1) {
+      const alone = right.map((found, number) => found.filter((one, trial) => one && !right[1 - number][trial]).length);
+      words.push(`Of them ${alone.map((count, number) => `${count} by ${tracks[number].name} alone`).join(", ")}.`);
+    }
+    say($("rates"), truth.length ? `${words.join(" ")} A trial is recognised if its type was announced for longest.` : "");
+  }
+
+  #address() {
+    const { at, first } = this.#timeline;
+    if (at !== null && this.#wanted === null) history.replaceState(null, "", `#t=${((at - first) / 1e6).toFixed(2)}`);
+  }
+
+  #link(seconds) {
+    const { first, last } = this.#timeline;
+    this.#wanted = seconds;
+    if (seconds === null || last === null || (this.#share < 1 && first + 1e6 * seconds > last)) return;
+    this.#wanted = null;
+    this.#timeline.seek(first + 1e6 * seconds);
   }
 }
+
+// The time in the address, in seconds from the recording's beginning: "#t=12.34".
+function linked() {
+  const seconds = Number(new URLSearchParams(location.hash.slice(1)).get("t") ?? NaN);
+  return Number.isFinite(seconds) ? seconds : null;
+}
+
+function longest(announced, { from, to }, until) {
+  const lengths = new Map();
+  for (const span of announced) {
+    const length = Math.min(span.to, to, until) - Math.max(span.from, from);
+    if (length > 0) lengths.set(span.name, (lengths.get(span.name) ?? 0) + length);
+  }
+  return [...lengths].sort(([, one], [, other]) => other - one)[0]?.[0];
+}
+

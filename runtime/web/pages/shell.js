@@ -10,6 +10,7 @@ const $ = (id) => document.getElementById(id);
  * @returns {function(string, object=): boolean} ask(what, more): send a request; what is refused is said in #refused
  */
 export function openPage(handlers) {
+  let lasts; // until what is said of the glove is too old
   const bar = document.querySelector("header");
   const title = document.createElement("h1"), brand = document.createElement("span"), badges = document.createElement("p");
   brand.className = "brand";
@@ -28,17 +29,20 @@ export function openPage(handlers) {
     },
     closed: () => {
       link(false, `not connected since ${clock(performance.now())}`);
+      clearTimeout(lasts);
+      glove("warn", $("glove-state").hidden ? "" : "not known");
       handlers.closed?.();
     },
     shell: (message) => {
       show(message);
       handlers.shell?.(message);
     },
-    glove: ({ is, words }) => {
-      $("glove-state").hidden = !words;
-      $("glove-state").dataset.is = is;
-      say($("glove-state"), `glove: ${words}`);
-      handlers.glove?.({ is, words });
+    glove: (message) => {
+      const since = clock(performance.now());
+      clearTimeout(lasts);
+      if (message.lasts_s) lasts = setTimeout(() => glove("bad", `silent since ${since}`), 1000 * message.lasts_s);
+      glove(message.is, message.words);
+      handlers.glove?.(message);
     },
     refused: (message) => {
       if ($("refused")) say($("refused"), message.why);
@@ -62,6 +66,12 @@ function made(kind, id, name = "") {
 function link(up, words) {
   $("link").dataset.is = up ? "good" : "bad";
   say($("link"), `page: ${words}`);
+}
+
+function glove(level, words) {
+  $("glove-state").hidden = !words;
+  $("glove-state").dataset.is = level;
+  say($("glove-state"), `glove: ${words}`);
 }
 
 function show({ project, pages, wearer, build, rate }) {

@@ -1,4 +1,4 @@
-// Whether what a page shows is current: the age of its data, its link to the server, and the devices of the glove.
+// Whether what a page shows is current: the age of its data, and its link to the server.
 import { say } from "./wire.js";
 
 const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
@@ -7,7 +7,7 @@ const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
 export const clock = (at) => new Date(Date.now() - performance.now() + at).toTimeString().slice(0, 8);
 
 /**
- * Watches the age of the data, and says it in #age; the devices in #glove-state.
+ * Watches the age of the data, and says it in #age.
  *
  * Data is old after half a second, or after three periods of its source if these are longer. Old data, and all data while
  * the link is down, is greyed: the root element has the class "old".
@@ -17,13 +17,11 @@ export class State {
   #dataUs = null;
   #intervals = [];
   #link = null;
-  #devices = null;
-  #lostAt = new Map();
 
   /** @param {function(boolean): void} changed called with whether the data is old, when that changes */
   constructor(changed = () => {}) {
     this.changed = changed;
-    this.live = true; // a recording has no glove
+    this.live = true; // moments of a recording have no age
     this.old = false;
     setInterval(() => this.#look(), LOOK_MS);
   }
@@ -47,38 +45,17 @@ export class State {
     this.#look();
   }
 
-  /** Take the devices: name, and whether each is connected. */
-  devices(devices) {
-    for (const { name, connected } of devices) {
-      // Of a device that was lost before this page was opened, the time is not known.
-      if (connected) this.#lostAt.delete(name);
-      else if (!this.#lostAt.has(name)) this.#lostAt.set(name, this.#devices === null ? null : performance.now());
-    }
-    this.#devices = devices;
-    this.#look();
-  }
-
   #look() {
     const up = Boolean(this.#link), age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
     const middle = [...this.#intervals].sort((one, other) => one - other)[this.#intervals.length >> 1] ?? 0;
-    const silent = age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
+    const silent = this.live && age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
     const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
     const words = this.#link === null ? "" : !up ? `no data${since || " yet"}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "";
     say(document.getElementById("age"), words);
-    this.#glove(up, silent ? since : "");
     document.documentElement.classList.toggle("old", old);
     if (old === this.old) return;
     this.old = old;
     this.changed(old);
-  }
-
-  #glove(up, silent) {
-    const element = document.getElementById("glove-state");
-    element.hidden = !this.live;
-    const lost = [...this.#lostAt].map(([name, at]) => `${name} lost${at === null ? "" : ` since ${clock(at)}`}`).join(", ");
-    const words = !up ? "not known" : lost || (silent ? `silent${silent}` : this.#devices === null ? "not reported" : "connected");
-    element.dataset.is = words === "connected" ? "good" : up && (lost || silent) ? "bad" : "warn";
-    say(element, `glove: ${words}`);
   }
 }
 

@@ -1,153 +1,393 @@
-// Spans of time in lanes on a canvas, and the predictions of the last seconds in such lanes.
+// One axis of time for runs and recordings: lanes of spans on a canvas, a cursor, zoom, and keys. All times are in
+// microseconds.
+import { typeStyles } from "./types.js";
+import { say } from "./wire.js";
 
-// Okabe and Ito's colours; spans of the same colour are distinguished by name, and by a line at the foot.
-const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999"];
-const DARK_ON = new Set(["#e69f00", "#56b4e9", "#f0e442", "#cc79a7", "#999999", "#009e73"]);
-const LANES = [
-  { name: "this frame", of: (entry) => entry.candidate },
-  { name: "announced", of: (entry) => entry.grasp },
-  { name: "segment", of: (entry) => (entry.segment_us === null ? null : entry.segment_type) },
-  { name: "health", of: (entry) => entry.health, colours: { ok: "good", changing: "main", degraded: "warn", unknown: "bad" } },
-];
-const PARTS = ["candidate", "grasp", "health", "state", "segment", "segment_type", "segment_us"];
-const SPAN_US = 30_000_000;
-const GAP_US = 1_000_000;
-const LETTERS = 14;
+const $ = (id) => document.getElementById(id);
+const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
+const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
+const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
+const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second
+const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 let style = null;
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (style = null));
 
-function styleOf(element) {
-  const css = getComputedStyle(element), names = ["text", "soft", "page", "line", "good", "main", "warn", "bad", "focus"];
-  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).trim()]));
+/** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
+export class Track {
+  constructor(name = "") {
+    this.name = name;
+    this.announced = [];
+    this.segments = [];
+    this.health = [];
+    this.untilUs = null;
+  }
+
+  /** Take a change of the prediction; what is "" ends. */
+  take([time, announced, health, type, began]) {
+    extend(this.announced, announced, time);
+    extend(this.health, health, time);
+    extend(this.segments, type, time, began);
+    this.untilUs = time;
+  }
+
+  /** End all spans at the last time of which something is known. */
+  end() {
+    this.take([this.untilUs, "", "", "", null]);
+  }
 }
+
+function extend(lane, name, time, began = null) {
+  const last = lane.at(-1), lasts = last?.to === Infinity;
+  if (lasts && last.name === name && (began === null || last.from === began)) return;
+  if (lasts) last.to = time;
+  if (name) lane.push({ from: began ?? time, to: Infinity, name });
+}
+
+/** Return the span of a lane at a moment. */
+export function spanAt(lane, us) {
+  const span = lane[after(lane, us) - 1];
+  return span && us < span.to ? span : null;
+}
+
+// The place of the first span that begins after a moment.
+function after(lane, us) {
+  let low = 0, high = lane.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (lane[middle].from > us) high = middle;
+    else low = middle + 1;
+  }
+  return low;
+}
+
+/** Return whether a prediction is wrong: "unknown" is none. */
+export const differs = (announced, truth) => announced !== truth && announced !== "unknown";
 
 /**
- * Draw lanes of spans: each lane has a `name` and `spans`, whose `from` and `to` are moments, with a `name` that is
- * one of `types` or has a `colour` of the page.
- * @returns the canvas's pen, a function from a moment to its place, width and height; null if it is not shown
+ * Return the spans in which a label has another prediction: the errors, and those before the type of the label was first
+ * announced, while the hand moves to it.
  */
-export function drawLanes(canvas, lanes, from, to, types, foot = 0) {
-  const dense = devicePixelRatio || 1, wide = canvas.clientWidth, high = canvas.clientHeight;
-  if (!wide || !high) return null;
-  const [across, down] = [Math.round(wide * dense), Math.round(high * dense)];
-  if (canvas.width !== across || canvas.height !== down) [canvas.width, canvas.height] = [across, down];
-  style ??= styleOf(canvas);
-  const pen = canvas.getContext("2d"), lane = (high - foot) / lanes.length;
-  const x = (us) => ((us - from) / (to - from)) * wide;
-  pen.setTransform(dense, 0, 0, dense, 0, 0);
-  pen.clearRect(0, 0, wide, high);
-  pen.font = `${LETTERS}px system-ui, sans-serif`;
-  pen.textBaseline = "middle";
-  lanes.forEach(({ name, spans }, at) => {
-    const top = at * lane + LETTERS + 4, tall = lane - LETTERS - 7;
-    pen.fillStyle = style.soft;
-    pen.fillText(name, 0, at * lane + LETTERS / 2 + 2);
-    pen.fillStyle = style.page;
-    pen.fillRect(0, top, wide, tall);
-    for (const span of spans) {
-      const left = Math.max(x(span.from), 0), right = Math.min(x(span.to), wide);
-      if (right > 0 && left < wide) drawSpan(pen, span, types.indexOf(span.name), left, top, Math.max(right - left, 1), tall);
+function errors(truth, announced) {
+  const wrong = [], early = [];
+  for (const { from, to, name } of truth) {
+    const inside = announced.slice(Math.max(after(announced, from) - 1, 0), after(announced, to)).filter((span) => span.to > from);
+    const right = inside.find((span) => span.name === name)?.from ?? -Infinity;
+    for (const span of inside.filter((one) => differs(one.name, name))) {
+      (span.from < right ? early : wrong).push({ from: Math.max(span.from, from), to: Math.min(span.to, to), name: span.name });
     }
-  });
-  return { pen, x, wide, high, style };
+  }
+  return { wrong, early };
 }
 
-function drawSpan(pen, { name, colour }, number, left, top, wide, tall) {
-  const plain = !colour && number < 0, fill = colour ? style[colour] : plain ? style.page : COLOURS[number % COLOURS.length];
-  pen.fillStyle = fill;
-  pen.fillRect(left, top, wide, tall);
-  if (plain) {
-    pen.strokeStyle = style.line;
-    pen.strokeRect(left + 0.5, top + 0.5, Math.max(wide - 1, 0), tall - 1);
-  }
-  if (number >= COLOURS.length) {
-    pen.fillStyle = style.text;
-    pen.fillRect(left, top + tall - 4, wide, 4);
-  }
-  const long = pen.measureText(name).width + 8, flat = long <= wide;
-  if (!flat && !(wide >= LETTERS + 2 && long <= tall)) return;
-  pen.save();
-  // A name that does not fit is written upwards.
-  pen.translate(flat ? left : left + wide / 2, flat ? top + tall / 2 : top + tall);
-  if (!flat) pen.rotate(-Math.PI / 2);
-  pen.fillStyle = colour ? style.page : plain ? style.text : DARK_ON.has(fill) ? "#000000" : "#ffffff";
-  pen.fillText(name, 4, 1);
-  pen.restore();
+/** Return a duration as "1:02.3". */
+export function clock(seconds, digits = 1) {
+  const whole = Math.max(seconds, 0), hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
+  const rest = (whole % 60).toFixed(digits).padStart(digits ? 3 + digits : 2, "0");
+  return `${hours ? `${hours}:${String(minutes).padStart(2, "0")}` : minutes}:${rest}`;
 }
 
-/** The changes of the prediction in order of time, and the canvas that shows the last of them. */
 export class Timeline {
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
+  live = true;
+  tracks = [new Track()];
+  truth = []; // spans in order of time
+  first = null;
+  last = null;
+  at = null; // the cursor; null follows now
+  dated = 0; // what makes time of day of a time of a run
+  #errors = []; // by track
+  #from = 0;
+  #span = USUAL_US;
+  #whole = false; // while a recording is read, the window has all of it, until somebody zooms
+  #styles = typeStyles([]);
+  #pointers = new Map();
+  #moved = 0;
+  #drawing = false;
+  #drawn = 0;
+
+  /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
+  constructor(canvas, on) {
     this.canvas = canvas;
-    this.entries = [];
-    this.types = [];
-    this.untilUs = 0;
-    this.edge = "now"; // the name of its right end
-  }
-
-  clear() {
-    this.entries = [];
-    this.untilUs = 0;
-  }
-
-  /** Take the prediction at entry.time_us. */
-  add(entry) {
-    let last = this.entries.at(-1);
-    if (last && entry.time_us < last.time_us) {
-      // Another run has another clock; a moment that is only a little older was passed by the changes sent before it.
-      if (last.time_us - entry.time_us < GAP_US) return;
-      this.clear();
-      last = undefined;
+    this.on = on;
+    canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
+    for (const kind of ["down", "move", "up", "cancel"]) {
+      canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
-    // A time without frames is unknown.
-    const silent = last && entry.time_us - this.untilUs > GAP_US;
-    if (silent) this.entries.push({ ...last, time_us: this.untilUs, over: true });
-    this.untilUs = entry.time_us;
-    if (last && !silent && !last.over && PARTS.every((part) => last[part] === entry[part])) return;
-    const kept = Object.fromEntries(PARTS.map((part) => [part, entry[part]]));
-    this.entries.push({ ...kept, time_us: entry.time_us, over: false });
-    const gone = this.entries.findIndex((one, at) => at > 0 && one.time_us > this.untilUs - SPAN_US);
-    if (gone > 1) this.entries.splice(0, gone - 1);
+    new ResizeObserver(() => this.draw()).observe(canvas);
+    const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
+    for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
+    addEventListener("keydown", (event) => this.#key(event));
   }
 
-  /** Return the segments that it shows: number, type, seconds, and whether it lasts; the newest first. */
-  segments() {
-    const found = new Map();
-    this.entries.forEach((entry, at) => {
-      if (entry.segment_us === null || entry.state === "forming" || entry.over) return;
-      const end = this.entries[at + 1]?.time_us ?? this.untilUs;
-      const seconds = (end - entry.segment_us) / 1e6;
-      found.set(entry.segment, { number: entry.segment, type: entry.segment_type, seconds, lasts: !this.entries[at + 1] });
+  /** Take the names of the types, which have colours. */
+  types(names) {
+    this.#styles = typeStyles(names);
+  }
+
+  /** Take a moment of a run. */
+  follow(time, change, unixUs) {
+    const [track] = this.tracks;
+    // Another host has another clock; a moment that is a little older was passed by the changes sent before it.
+    if (track.untilUs !== null && time < track.untilUs) {
+      if (track.untilUs - time < 1_000_000) return;
+      this.tracks = [new Track()];
+      this.first = this.at = null;
+      this.follow(time, change, unixUs);
+      return;
+    }
+    if (track.untilUs !== null && time - track.untilUs > 1_000_000) track.end();
+    track.take(change);
+    for (const lane of [track.announced, track.segments, track.health]) {
+      const gone = lane.findIndex((span, at) => span.to > time - KEPT_US && at >= lane.length - MOST_SPANS);
+      if (gone > 0) lane.splice(0, gone);
+    }
+    this.dated = unixUs - time;
+    this.first = Math.max(this.first ?? time, time - KEPT_US);
+    this.last = time;
+    if (this.at === null) this.#from = time - this.#span;
+    this.draw();
+  }
+
+  /** Take the past of a run, of which the page may know more already. */
+  past(changes, until) {
+    if (!changes.length) return;
+    const [known] = this.tracks, track = new Track(), [[begin]] = changes;
+    for (const change of changes) track.take(change);
+    track.untilUs = until;
+    if (known.untilUs !== null && known.untilUs <= until) {
+      for (const lane of ["announced", "segments", "health"]) {
+        const older = known[lane].filter(({ from }) => from < begin).map((span) => ({ ...span, to: Math.min(span.to, known.untilUs, begin) }));
+        track[lane].unshift(...older);
+      }
+    }
+    this.tracks = [track];
+    this.first = Math.min(track.announced[0]?.from ?? begin, begin);
+  }
+
+  /** Take the span of a recording and where its predictions differ from the labels. */
+  recorded(first, last) {
+    const fresh = this.last === null;
+    [this.first, this.last] = [first, last];
+    if (fresh || this.#whole) this.#show(first, last - first);
+    this.#whole = fresh || this.#whole;
+    this.#errors = this.tracks.map((track) => errors(this.truth, track.announced));
+    for (const id of ["next-error", "last-error"]) $(id).disabled = !this.#errors.some(({ wrong }) => wrong.length);
+    this.draw();
+  }
+
+  /** Put the cursor at a moment; null, and what is later than now, follows now. */
+  seek(us, show = true) {
+    if (this.last === null) return;
+    this.at = us === null || (this.live && us >= this.last) ? null : Math.round(Math.min(Math.max(us, this.first), this.last));
+    if (this.at === null) this.#from = this.last - this.#span;
+    else if (show && (this.at < this.#from || this.at > this.#from + this.#span)) this.#show(this.at - this.#span / 4);
+    this.on.moved();
+    this.draw();
+  }
+
+  /** Return what is known at the cursor, in words. */
+  get reading() {
+    if (this.last === null) return this.live ? "no frame yet" : "not read yet";
+    const at = this.at ?? this.last, parts = [];
+    if (this.live) parts.push(this.at === null ? "now" : `${clock((this.last - at) / 1e6)} ago`, time(at + this.dated));
+    else parts.push(`${clock((at - this.first) / 1e6, 2)} of ${clock((this.last - this.first) / 1e6)}`, time(at));
+    const truth = spanAt(this.truth, at);
+    if (truth) parts.push(`truth ${truth.name}`);
+    for (const track of this.tracks) {
+      const announced = spanAt(track.announced, at)?.name ?? "nothing";
+      parts.push(`${truth && differs(announced, truth.name) ? "✗ " : ""}${track.name && `${track.name} `}announced ${announced}`);
+    }
+    const segment = spanAt(this.tracks[0].segments, at), health = spanAt(this.tracks[0].health, at);
+    if (segment) parts.push(`segment ${segment.name}, ${((Math.min(segment.to, this.last) - segment.from) / 1e6).toFixed(1)} s`);
+    if (health) parts.push(`health ${health.name}`);
+    return parts.join(" · ");
+  }
+
+  // Lanes of bars of a kind: types, troubles, or errors over what came before the right type, lower.
+  #lanes() {
+    const lanes = this.truth.length ? [["truth", ["type", this.truth]]] : [];
+    this.tracks.forEach(({ name, announced }, number) => {
+      const { wrong, early } = this.#errors[number] ?? { wrong: [], early: [] }, of = name && ` of ${name}`;
+      lanes.push([`announced${name && ` by ${name}`}`, ["type", announced]]);
+      if (this.truth.length) lanes.push([`error${of}; low: not yet announced`, ["early", early], ["wrong", wrong]]);
     });
-    return [...found.values()].sort((one, other) => other.number - one.number);
+    const [{ name, segments, health }] = this.tracks, of = name && ` of ${name}`;
+    return [...lanes, [`segments${of}`, ["type", segments]], [`health${of}, where it is not ok`, ["trouble", health]]];
   }
 
+  /** Draw soon; while it follows now, ten times a second. */
   draw() {
-    const lanes = LANES.map(({ name, of, colours }) => ({ name, spans: this.#spans(of, colours) })), foot = LETTERS + 8;
-    const drawn = drawLanes(this.canvas, lanes, this.untilUs - SPAN_US, this.untilUs, this.types, foot);
-    if (drawn === null) return;
-    const { pen, wide, high } = drawn, seconds = SPAN_US / 1e6, step = wide < 500 ? 10 : 5;
-    pen.fillStyle = drawn.style.soft;
-    for (let ago = seconds; ago >= 0; ago -= step) {
-      const at = wide - (ago / seconds) * wide, text = ago ? `−${ago} s` : this.edge;
-      const half = pen.measureText(text).width / 2;
-      pen.fillText(text, Math.min(Math.max(at - half, 0), wide - 2 * half), high - foot / 2);
+    if (this.#drawing) return;
+    this.#drawing = true;
+    const wait = this.live && this.at === null ? FOLLOW_MS - (performance.now() - this.#drawn) : 0;
+    setTimeout(() => requestAnimationFrame(() => this.#paint()), Math.max(wait, 0));
+  }
+
+  #paint() {
+    [this.#drawing, this.#drawn] = [false, performance.now()];
+    const { canvas } = this, lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, wide = canvas.clientWidth;
+    if (canvas.style.height !== `${high}px`) canvas.style.height = `${high}px`;
+    if (!wide) return;
+    const dense = devicePixelRatio || 1, [across, down] = [Math.round(wide * dense), Math.round(high * dense)];
+    if (canvas.width !== across || canvas.height !== down) [canvas.width, canvas.height] = [across, down];
+    style ??= styleOf(canvas);
+    const pen = canvas.getContext("2d"), x = (us) => ((us - this.#from) / this.#span) * wide;
+    pen.setTransform(dense, 0, 0, dense, 0, 0);
+    pen.clearRect(0, 0, wide, high);
+    pen.font = `${LETTERS}px system-ui, sans-serif`;
+    pen.textBaseline = "middle";
+    lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));
+    this.#axis(pen, x, wide, high);
+    if (this.at !== null) {
+      pen.fillStyle = style.text;
+      pen.fillRect(x(this.at) - 1, 0, 2, high - FOOT);
+    }
+    this.#say();
+  }
+
+  #lane(pen, x, wide, name, bars, top) {
+    pen.fillStyle = style.soft;
+    pen.fillText(name, 0, top + LABEL / 2 + 1);
+    pen.fillStyle = style.page;
+    pen.fillRect(0, top + LABEL, wide, BAR);
+    for (const [kind, spans] of bars) {
+      let inked = -1;
+      for (let at = Math.max(after(spans, this.#from) - 1, 0); at < spans.length && spans[at].from < this.#from + this.#span; at++) {
+        const left = Math.max(x(spans[at].from), 0), right = Math.min(x(Math.min(spans[at].to, this.last)), wide);
+        // Of many spans in one pixel, one is drawn.
+        if (right <= 0 || right < inked + 0.5) continue;
+        this.#bar(pen, kind, spans[at].name, left, top + LABEL, Math.max(right - left, kind === "wrong" ? 2 : 1));
+        inked = right;
+      }
     }
   }
 
-  // Spans of equal names.
-  #spans(of, colours) {
-    const found = [];
-    let last = null;
-    for (const entry of this.entries) {
-      const name = entry.over ? null : of(entry);
-      if (last && last.name === name) continue;
-      if (last) last.to = entry.time_us;
-      last = name === null ? null : { name, colour: colours?.[name], from: entry.time_us, to: this.untilUs };
-      if (last) found.push(last);
+  #bar(pen, kind, name, left, top, wide) {
+    const { code = name, colour, ink } = kind === "trouble" ? {} : this.#styles.get(name) ?? {}, sign = kind === "wrong" ? "✗ " : "";
+    const fill = { wrong: style.bad, early: style.soft, trouble: name === "degraded" ? style.warn : style.bad }[kind] ?? colour;
+    const high = kind === "early" ? BAR / 3 : BAR;
+    pen.fillStyle = fill ?? style.page;
+    pen.fillRect(left, top + BAR - high, wide, high);
+    if (!fill) {
+      pen.strokeStyle = style.line;
+      pen.strokeRect(left + 0.5, top + 0.5, Math.max(wide - 1, 0), BAR - 1);
     }
-    return found;
+    const text = [name, code].map((one) => sign + one).find((one) => pen.measureText(one).width + 6 <= wide);
+    pen.fillStyle = kind !== "type" ? style.page : ink ?? style.text;
+    if (text && kind !== "early") pen.fillText(text, left + 3, top + BAR / 2 + 1);
   }
+
+  #axis(pen, x, wide, high) {
+    const least = (this.#span / 1e6 / wide) * TICK, step = STEPS.find((one) => one >= least) ?? 86_400;
+    const base = this.live ? -this.dated : this.first ?? 0, digits = step < 0.1 ? 2 : step < 1 ? 1 : 0;
+    pen.fillStyle = style.soft;
+    for (let tick = Math.ceil((this.#from - base) / 1e6 / step) * step; base + tick * 1e6 <= this.#from + this.#span; tick += step) {
+      const left = x(base + tick * 1e6), text = this.live ? time(tick * 1e6) : clock(tick, digits);
+      if (tick < 0) continue;
+      pen.fillRect(left, high - FOOT, 1, 5);
+      pen.fillText(text, Math.min(Math.max(left - pen.measureText(text).width / 2, 0), wide - pen.measureText(text).width), high - FOOT / 2 + 3);
+    }
+  }
+
+  #say() {
+    const { canvas, reading, last, first } = this, moved = this.at !== null || !this.live;
+    say($("place"), reading);
+    $("now").hidden = !this.live || this.at === null;
+    // While it follows now, only its end moves: nothing to be read out.
+    canvas.setAttribute("aria-valuetext", moved ? reading : "now");
+    canvas.setAttribute("aria-valuemax", ((moved && last !== null ? last - first : 0) / 1e6).toFixed(2));
+    canvas.setAttribute("aria-valuenow", ((this.at === null ? 0 : this.at - first) / 1e6).toFixed(2));
+  }
+
+  #show(from, span = this.#span) {
+    const whole = Math.max(this.live ? KEPT_US : this.last - this.first, 1_000_000);
+    this.#span = Math.min(Math.max(span, LEAST_US), whole);
+    this.#from = Math.min(Math.max(from, this.first - this.#span / 2), this.last - this.#span / 2);
+  }
+
+  #zoom(by, anchor = this.at ?? this.last) {
+    if (this.last === null) return;
+    this.#whole = false;
+    const inside = anchor >= this.#from && anchor <= this.#from + this.#span ? anchor : this.#from + this.#span / 2;
+    this.#show(inside - (inside - this.#from) * by, this.#span * by);
+    if (this.live && this.at === null) this.#from = this.last - this.#span;
+    this.draw();
+  }
+
+  #pan(us) {
+    if (this.last === null) return;
+    this.#whole = false;
+    if (this.at === null) this.at = this.last; // it was dragged back: it stays there
+    this.#show(this.#from + us);
+    this.draw();
+  }
+
+  #wheel(event) {
+    event.preventDefault();
+    const { left, width } = this.canvas.getBoundingClientRect(), across = event.shiftKey ? event.deltaY : event.deltaX;
+    if (across) this.#pan((across / width) * this.#span);
+    else this.#zoom(1.002 ** event.deltaY, this.#from + ((event.clientX - left) / width) * this.#span);
+  }
+
+  // One pointer drags, two pinch; one that did not move puts the cursor.
+  #pointer(kind, event) {
+    const { left, width } = this.canvas.getBoundingClientRect(), here = event.clientX - left, before = this.#pointers.get(event.pointerId);
+    const us = (pixel) => this.#from + (pixel / width) * this.#span;
+    if (kind === "down") {
+      if (!this.#pointers.size) this.#moved = 0;
+      this.canvas.setPointerCapture(event.pointerId);
+      this.#pointers.set(event.pointerId, here);
+    } else if (before !== undefined && kind === "move") {
+      this.#pointers.set(event.pointerId, here);
+      this.#moved += Math.abs(here - before);
+      if (this.#moved < 4) return;
+      const [other] = [...this.#pointers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
+      if (other === undefined) this.#pan(((before - here) / width) * this.#span);
+      else this.#zoom(Math.max(Math.abs(before - other), 8) / Math.max(Math.abs(here - other), 8), us(other));
+    } else if (before !== undefined) {
+      this.#pointers.delete(event.pointerId);
+      if (kind === "up" && this.#moved < 4) this.seek(us(here));
+    }
+  }
+
+  #step(seconds) {
+    this.seek((this.at ?? this.last) + 1e6 * seconds);
+  }
+
+  #jump(by) {
+    const places = this.#errors.flatMap(({ wrong }) => wrong).map(({ from }) => from).sort((one, other) => one - other), at = this.at ?? this.last;
+    const next = by > 0 ? places.find((from) => from > at) : places.findLast((from) => from < at);
+    if (next !== undefined) this.seek(next);
+  }
+
+  #keys = {
+    " ": () => this.on.toggle(),
+    "+": () => this.#zoom(1 / 2),
+    "-": () => this.#zoom(2),
+    ArrowLeft: () => this.#step(-1),
+    ArrowRight: () => this.#step(1),
+    j: () => this.#step(-10),
+    l: () => this.#step(10),
+    ",": () => this.#step(-0.02),
+    ".": () => this.#step(0.02),
+    Home: () => this.seek(this.first),
+    End: () => this.seek(this.live ? null : this.last),
+    n: () => this.#jump(1),
+    p: () => this.#jump(-1),
+  };
+
+  #key(event) {
+    const { key, target } = event, typing = /^(SELECT|INPUT|TEXTAREA)$/.test(target.tagName);
+    const presses = key === " " && target.closest("button, a, summary");
+    if (event.ctrlKey || event.altKey || event.metaKey || typing || presses || !Object.hasOwn(this.#keys, key)) return;
+    event.preventDefault();
+    if (this.last !== null) this.#keys[key]();
+  }
+}
+
+const time = (unixUs) => new Date(unixUs / 1000).toTimeString().slice(0, 8);
+
+function styleOf(element) {
+  const css = getComputedStyle(element), names = ["text", "soft", "page", "line", "warn", "bad"];
+  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).trim()]));
 }

@@ -1,7 +1,7 @@
 // The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
 import { counted, State } from "./state.js";
-import { Timeline } from "./timeline.js";
+import { chip, typeStyles } from "./types.js";
 import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -23,7 +23,6 @@ export class View {
   constructor() {
     this.live = true;
     this.state = new State((old) => this.#aged(old));
-    this.timeline = new Timeline($("past"));
     this.frame = null;
     this.shown = null;
     this.drawing = null;
@@ -34,20 +33,21 @@ export class View {
     this.rows = new Map();
     this.quarantined = [];
     this.words = 0;
+    this.later = null;
+    this.drawn = true; // what came last
     this.said = { text: "", at: 0, since: 0, candidate: "" };
-    requestAnimationFrame(() => this.#draw());
   }
 
-  /** Take the grasp types, switches and joints of the build, and whether its moments are those of a recording. */
-  build(build) {
-    this.live = this.state.live = !build.replay; // moments of a recording have no age
-    this.timeline.types = build.grasps.filter((name) => name !== "none");
+  /** Take the grasp types, switches and joints of the build, and whether its moments are those of a run. */
+  build(build, live) {
+    this.live = this.state.live = live; // moments of a recording have no age
     this.bits = new Map(build.switches.map((name, bit) => [name, bit]));
     this.joints = build.joints;
     this.closed = build.switches.map(() => false);
     this.rows.clear();
     $("types").replaceChildren();
-    for (const grasp of build.grasps) this.#row(grasp);
+    const styles = typeStyles(build.grasps);
+    for (const grasp of build.grasps) this.#row(grasp, styles.get(grasp));
     $("preshape").hidden = !build.preshapes;
     $("empty-hand").hidden = build.empty_hand;
     this.classes = build.grasps;
@@ -59,29 +59,17 @@ export class View {
     this.drawing = drawHand($("hand"), hand, {});
   }
 
-  /** Take the past predictions. */
-  past({ changes, until_us }) {
-    this.timeline.clear();
-    for (const [time_us, candidate, grasp, health, state, segment, segment_type, segment_us] of changes) {
-      this.timeline.untilUs = time_us; // an entry lasts until the next
-      this.timeline.add({ time_us, candidate, grasp, health, state, segment, segment_type, segment_us });
-    }
-    this.timeline.untilUs = until_us;
-  }
-
   /** Take a moment. */
   take(frame) {
-    if (frame === null) return;
     this.frame = frame;
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     const age = ages.length ? Math.min(...ages) : null;
     if (this.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
-    this.timeline.add(frame);
+    this.#later();
   }
 
   /** Take the health of devices and inputs. */
   health(report) {
-    this.state.devices(report.devices);
     const rows = report.devices.map((device) => {
       const row = document.createElement("tr");
       const state = device.error || (device.connected ? "connected" : "not connected");
@@ -97,9 +85,16 @@ export class View {
     this.#wrong();
   }
 
+  /** Tell news, also to screen readers. */
+  tell(words) {
+    say($("news"), words);
+    Object.assign(this.said, { text: words, at: performance.now() });
+    say($("spoken"), words);
+  }
+
   #aged(old) {
-    this.timeline.edge = old ? "last" : "now";
     this.shown = null; // everything is drawn again
+    this.#later();
     this.#title();
     if (old) this.#announce("no data", performance.now(), true);
   }
@@ -109,35 +104,37 @@ export class View {
     document.title = words ? `${words} · thenar` : "thenar";
   }
 
-  #row(grasp) {
+  #row(grasp, style) {
     const row = document.createElement("li"), bar = document.createElement("div"), full = document.createElement("span");
-    const parts = ["sign", "name", "share"].map((name) => {
+    const [name, share] = ["name", "share"].map((kind) => {
       const part = document.createElement("span");
-      part.className = name;
+      part.className = kind;
       return part;
     });
-    parts[1].textContent = grasp;
+    name.textContent = grasp;
     bar.className = "bar";
     bar.append(full);
-    row.append(...parts, bar);
+    row.append(chip(style), name, bar, share);
     $("types").append(row);
-    this.rows.set(grasp, { row, full, share: parts[2] });
-    return this.rows.get(grasp);
+    this.rows.set(grasp, { row, full, share });
+  }
+
+  #later() {
+    if (this.drawn) requestAnimationFrame(() => this.#draw());
+    this.drawn = false;
   }
 
   #draw() {
-    requestAnimationFrame(() => this.#draw());
+    this.drawn = true;
     const { frame } = this, now = performance.now();
     if (frame === null || frame === this.shown) return;
     const news = this.shown?.grasp !== frame.grasp;
     this.shown = frame;
     this.#now(frame);
     this.#hand(frame);
-    this.timeline.draw();
-    if (news || now - this.words >= WORDS_MS) {
-      this.words = now;
-      this.#numbers(frame);
-    }
+    const wait = news ? 0 : WORDS_MS - (now - this.words);
+    if (wait <= 0) this.#numbers(frame);
+    else this.later ??= setTimeout(() => this.#numbers(this.frame), wait);
     this.#announce(this.state.old ? "no data" : frame.grasp, now);
   }
 
@@ -180,10 +177,12 @@ export class View {
       if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
       else row.removeAttribute("aria-current");
     }
-    if (!this.rows.has(frame.grasp) && frame.grasp !== "unknown") this.#row(frame.grasp);
   }
 
   #numbers(frame) {
+    clearTimeout(this.later);
+    this.later = null;
+    this.words = performance.now();
     this.#bars(frame);
     for (const [grasp, { share }] of this.rows) {
       const at = this.classes.indexOf(grasp);
@@ -201,11 +200,6 @@ export class View {
       ...(this.rates ? { "read": this.rates } : {}),
     });
     this.#wrong();
-    const segments = this.timeline.segments().slice(0, SHOWN);
-    list($("segments"), segments.map(({ number, type, seconds, lasts }) => `${number}: ${type}, ${seconds.toFixed(1)} s${lasts && !this.state.old ? ", now" : ""}`));
-    const types = segments.length ? segments.map(({ type }) => type).reverse().join(", ") : "none";
-    const label = `Predictions of the last 30 seconds${this.state.old ? ", which have ended" : ""}: this frame ${frame.candidate}, announced ${frame.grasp}, segments: ${types}`;
-    if ($("past").getAttribute("aria-label") !== label) $("past").setAttribute("aria-label", label);
   }
 
   #wrong() {

@@ -60,6 +60,14 @@ def test_a_type_that_nobody_else_has_is_taught_by_three_trials(folder: Path, tmp
     adapted = made.manifest.adapted
     assert adapted is not None
     assert (made.after, adapted.counts, adapted.added) == (12, (3, 3, 3, 3), ("rod",))
+    assert made.by_type[3] == (3, 0, 3)
+    assert [sum(column) for column in zip(*made.by_type, strict=True)] == [12, made.before, made.after]
+    # Its report is of itself: of the person's trials.
+    page = (tmp_path / "mine" / "report.html").read_text()
+    assert build.manifest.checksum in page
+    assert f"{made.after} of 12 trials" in page
+    assert f"Firmware</dt><dd>{made.firmware}" in page.replace("\n", "")
+    assert "12 nested folds" in page.partition('id="confusion"')[2]
     found = verify(tmp_path / "mine", later)
     assert found.holds
     known = later.grasps != "rod"

@@ -15,8 +15,8 @@ from thenar.compiler.text import text_of
 def test_the_summary_gives_switches_time_accuracy_and_reference_points(examples: Any) -> None:
     marks = examples.example_frontier().marks
     assert summary(examples.example_frontier(marks=(marks[0], marks[2]))) == (
-        "Point 5: 33 of 160 switches, read and classified in 440 us on ATmega328P at 16 MHz, reach 92.9 [92.1, 93.7] % "
-        "accuracy (new subject, trials), against 93.6 % in 2.05 ms with all 160 switches and 91.5 % in 905 us with 35 "
+        "Point 5: 33 of 160 switches, read and classified in 440 µs on ATmega328P at 16 MHz, reach 92.9 [92.1, 93.7] % "
+        "accuracy (new subject, trials), against 93.6 % in 2.05 ms with all 160 switches and 91.5 % in 905 µs with 35 "
         "switches (paper, S = 62). Cross-validation gave 93.3 %; 0.4 points are subtracted, because the best of many "
         "is picked by its luck, too."
     )

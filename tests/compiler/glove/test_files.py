@@ -85,7 +85,7 @@ def test_places_in_the_list_are_those_of_the_hand(hand: HandShape) -> None:
 def test_the_readme_says_what_to_expect(hand: HandShape) -> None:
     text = " ".join(spec_files(manifest_of(hand.names[:14]), hand=hand)["README.txt"].decode().split())
     assert (
-        "A whole scan: 1 transaction, 121.3 us on the wire, 100.0 % of the 121.3 us for all 14 wired switches." in text
+        "A whole scan: 1 transaction, 121.3 µs on the wire, 100.0 % of the 121.3 µs for all 14 wired switches." in text
     )
     assert "Accuracy, new subject: 90.0 % [60.0, 98.0], 9 of 10 trials in 4 nested folds." in text
     assert "right hand of 190 mm length laid flat" in text

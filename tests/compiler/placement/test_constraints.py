@@ -108,7 +108,7 @@ def test_limits_are_obeyed_and_idle_ones_change_nothing(name: str) -> None:
         ({"keep": ("a",), "never": ("b", "a")}, "``have`` and ``never`` both name a"),
         ({"keep": ("a", "b"), "apart_mm": 6.5}, "``have`` a,b are 6.0 mm apart, ``apart_mm`` requires 6.5"),
         ({"keep": ("p", "q"), "taxels": 1}, "``have`` names more taxels than ``at_most`` 1 taxels"),
-        ({"keep": ("a", "c"), "budget_us": 12.0}, "``have`` takes 15.5 us to read, ``budget_us`` allows 12"),
+        ({"keep": ("a", "c"), "budget_us": 12.0}, "``have`` takes 15.5 µs to read, ``budget_us`` allows 12"),
         ({"budget_us": 5.0}, "``never`` and ``budget_us`` leave nothing"),
         ({"never": ("pp",)}, "no input 'pp'"),
         ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "``apart_mm``: the position of b, c, p, q is unknown"),
@@ -147,7 +147,7 @@ def test_joints_are_kept_and_left_out_by_name_as_switches_are() -> None:
 @pytest.mark.parametrize("mask", [True, False])
 @pytest.mark.parametrize("budget_us", [300.0, 900.0, 1290.0, 1500.0, 7000.0])
 def test_no_more_joints_are_kept_than_a_record_within_the_budget_has(budget_us: float, mask: bool) -> None:
-    """A record is 3 bytes and one a sensor, at 86.8 us, and 250 us to digitise each: of all sets, the largest fit."""
+    """A record is 3 bytes and one a sensor, at 86.8 µs, and 250 µs to digitise each: of all sets, the largest fit."""
     joints = SENSORS_18[:4]
     glove = GloveWiring(port="p", mask=mask)
     times = record_times_us(joints, glove)
@@ -168,7 +168,7 @@ def test_no_more_joints_are_kept_than_a_record_within_the_budget_has(budget_us: 
     assert len(kept) == max(map(len, allowed))
     assert len(kept_joints(samples, 2, limits)) == min(2, len(kept))
     if len(kept) < 3:
-        with pytest.raises(TrainingError, match=r"``have`` names 3 joints, whose record takes \d+\.\d us"):
+        with pytest.raises(TrainingError, match=r"``have`` names 3 joints, whose record takes \d+\.\d µs"):
             kept_joints(samples, None, replace(limits, keep=joints[:3]))
 
 

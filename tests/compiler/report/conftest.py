@@ -17,8 +17,10 @@ from thenar.compiler.model.compare import worst_case
 from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.report.content import ReportContent
+from thenar.compiler.report.tryout import page_data
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
+from thenar.runtime.model.integers import tables_to_bytes
 from thenar.simulator.handmaps.handmap import hand_map
 
 from ...sets import grasp_set_of
@@ -76,11 +78,15 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     sensors = SENSORS_18 if set(joints) <= set(SENSORS_18) else (*joints, *SENSORS_18[len(joints) :])
     glove = GloveWiring(port="/dev/ttyUSB0", joints=sensors) if joints else None
     harness = propose_harness(names, cyberglove=glove)
-    made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
+    made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness, hand=hand)
+    rows = made.recogniser.read(made.recogniser.samples)
     return ReportContent(
         manifest=made.manifest,
         tables=made.tables,
         facts=made.facts,
+        data=page_data(
+            made.manifest, tables_to_bytes(made.tables), made.drawing, rows.switches, rows.codes, rows.labels
+        ),
         warnings=made.warnings,
         tree=tree,
         confusion=made.confusion,

@@ -11,9 +11,8 @@ from hypothesis.extra.numpy import arrays
 from msgspec.structs import replace as replaced
 
 from thenar.compiler.frontier.points import Frontier
-from thenar.compiler.hand import HandShape
 from thenar.compiler.placement.tree import grow_id3
-from thenar.compiler.report.content import ReportContent, hand_picture
+from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.frontier import marks_table, notes, points_table
 from thenar.compiler.report.sections import (
     MOST_LINES,
@@ -65,15 +64,6 @@ def test_the_terms_are_drawn_the_weightiest_first(bare: ReportContent) -> None:
     assert [share for _, share in bars] == pytest.approx([span / spans[0] for span in spans], abs=0.01)
     names = {text.partition(",")[0] for text, _ in bars}
     assert names <= {*bare.switch_names, *(joint.name for joint in bare.manifest.joints)}
-
-
-def test_switches_stand_on_the_picture_where_they_lie_on_the_hand(hand: HandShape) -> None:
-    kept = hand.names[5:2:-1]
-    picture = hand_picture(hand, kept, "ident", "title", "summary")
-    assert [name for name, *_ in picture.dots] == list(hand.names)
-    places = np.array([[float(x), -float(y)] for _, x, y, _ in picture.dots])
-    assert np.abs(places - hand.places).max() <= 0.05 + 1e-9
-    assert {name: order for name, _, _, order in picture.dots if order} == {kept[0]: "1", kept[1]: "2", kept[2]: "3"}
 
 
 def test_the_share_of_all_switches_together_is_what_the_tree_tells(bare: ReportContent) -> None:

@@ -1,4 +1,4 @@
-"""try.html as a visitor has it: opened from its file in a real browser, clicked, typed at."""
+"""The tab Try as a visitor has it: opened from its file in a real browser, clicked, typed at."""
 
 import csv
 import io
@@ -18,6 +18,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
 
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.recordings.export import to_csv
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
@@ -102,7 +103,7 @@ KINDS: dict[str, tuple[int, dict[str, Any]]] = {
 
 
 def compiled(grasp_set: GraspSet, folder: Path, **options: Any) -> Build:
-    compile_build(grasp_set, folder, folds=0, **options)
+    compile_build(grasp_set, folder, folds=0, documents=Documents(), **options)
     return Build.load(folder)
 
 
@@ -112,7 +113,7 @@ def test_all_rows_have_pythons_scores_and_answers(trier: Trier, tmp_path: Path, 
     grasp_set = make_set()
     build = compiled(grasp_set, tmp_path / "build", **options)
     assert (tmp_path / "build" / "tables.bin").read_bytes()[8] == version
-    trier.open_file(tmp_path / "build" / "try.html")
+    trier.open_file(tmp_path / "build" / "report.html", "#try")
     for lossy in (False, True):
         frames = frames_of(build, grasp_set, lossy)
         assert differing(build, frames, trier.script(ASK, frames)) == []
@@ -123,7 +124,7 @@ def test_the_page_predicts_none_as_python_does(trier: Trier, with_none_too: Gras
     for name, grasp_set in (("class", with_none_too), ("refusing", make_set())):
         build = compiled(grasp_set, tmp_path / name, rounds=8)
         assert (build.rejector is None) == (name == "class")
-        trier.open_file(tmp_path / name / "try.html")
+        trier.open_file(tmp_path / name / "report.html", "#try")
         warned = trier.script("return document.getElementById('empty-hand')?.checkVisibility() ?? false")
         assert warned == (name == "refusing")
         frames = frames_of(build, grasp_set, lossy=True)
@@ -156,17 +157,17 @@ def gloved() -> GraspSet:
 @pytest.fixture(scope="module")
 def folder(gloved: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
     where = tmp_path_factory.mktemp("gloved") / "build"
-    compile_build(gloved, where, hand=hand_map(), folds=0, rounds=8)
+    compile_build(gloved, where, hand=hand_map(), folds=0, rounds=8, documents=Documents())
     return where
 
 
 @pytest.fixture
 def opened(trier: Trier, folder: Path) -> Iterator[Trier]:
     """Return the browser with the page open; nothing may have been complained of or asked for when the test ends."""
-    trier.open_file(folder / "try.html")
+    trier.open_file(folder / "report.html", "#try")
     yield trier
     assert trier.log() == []
-    assert trier.requests() == [(folder / "try.html").as_uri()]
+    assert trier.requests() == [(folder / "report.html").as_uri()]
 
 
 def said_of(build: Build, bits: list[int], codes: list[int]) -> tuple[str, str]:
@@ -297,7 +298,7 @@ def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(trier: 
     taxels = Counter(switch.source for switch in build.manifest.switches if switch.threshold is not None)
     name, levels = max(taxels.items(), key=lambda each: each[1])
     assert levels > 1
-    trier.open_file(tmp_path / "build" / "try.html")
+    trier.open_file(tmp_path / "build" / "report.html", "#try")
     button = trier.one(f"#hand [role=button][aria-label^='{name}']")
     rising = sorted(
         (switch.threshold.code, bit)
@@ -321,6 +322,40 @@ def test_a_taxel_goes_from_level_to_level_and_recorded_values_are_levels(trier: 
     assert trier.log() == []
 
 
+def test_the_next_misread_row_is_a_button_and_a_key_away(opened: Trier, gloved: GraspSet, tmp_path: Path) -> None:
+    wrong = gloved.grasps.copy()
+    wrong[[4, 7]] = np.roll(gloved.grasps, 1)[[4, 7]]
+    path = tmp_path / "rows.csv"
+    path.write_text(to_csv(replace(gloved, grasps=wrong)))
+    opened.one("#file").send_keys(str(path))
+    opened.wait(lambda: opened.text("rows-said").startswith("rows.csv: 96 rows"))
+    misread = opened.script(
+        "return [...Array(96).keys()].filter((at) => { const row = document.getElementById('row'); row.value = at;"
+        " row.dispatchEvent(new Event('input')); return document.getElementById('truth').textContent.endsWith('✗.') })"
+    )
+    assert {4, 7} <= set(misread)
+    opened.script("const row = document.getElementById('row'); row.value = 4; row.dispatchEvent(new Event('input'))")
+    after = [number for number in misread if number > 4]
+    seen = []
+    for step in range(len(misread)):
+        if step % 2:
+            opened.one("#misread").click()
+        else:
+            ActionChains(opened.driver).send_keys("n").perform()
+        seen.append(int(re.findall(r"Row (\d+) of 96: was .* mistaken", opened.text("truth"))[0]) - 1)
+    assert seen == [*after, *(number for number in misread if number <= 4)]
+
+
+def test_bars_and_the_best_of_them_are_seen_in_forced_colours(opened: Trier) -> None:
+    features = [{"name": "forced-colors", "value": "active"}]
+    opened.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    look = """return ['.best .bar', 'tr:not(.best) .bar', 'body'].map((one) => document.querySelector(one))
+        .map((one) => getComputedStyle(one)).map((style) => [style.backgroundColor, style.borderTopColor])"""
+    (best, best_edge), (other, edge), (page, _) = opened.script(look)
+    assert best == best_edge == edge != page
+    assert other == page
+
+
 @pytest.mark.parametrize("width", [1400, 400])
 def test_the_page_fits_light_and_dark_screens_with_readable_letters(opened: Trier, width: int) -> None:
     metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
@@ -330,7 +365,8 @@ def test_the_page_fits_light_and_dark_screens_with_readable_letters(opened: Trie
         opened.wait(lambda: opened.script("return document.documentElement.scrollWidth <= innerWidth"))
         small = """return [...document.querySelectorAll('svg text')].filter((text) => {
             const at = text.getScreenCTM();
-            return parseFloat(getComputedStyle(text).fontSize) * Math.hypot(at.a, at.b) < 8; }).length"""
+            return text.checkVisibility() &&
+                parseFloat(getComputedStyle(text).fontSize) * Math.hypot(at.a, at.b) < 8; }).length"""
         opened.wait(lambda: opened.script(small) == 0)
         look = """return ['body', '.shut', '.skin'].map((one) => document.querySelector(one))
             .map((one) => getComputedStyle(one).color + getComputedStyle(one).fill)"""
@@ -360,15 +396,15 @@ def test_names_that_hold_scripts_run_nothing(trier: Trier, tmp_path: Path) -> No
         switch_names=tuple(f"{types[number % 4]} {number}" for number in range(len(made.switch_names))),
         joints=tuple(replace(joint, name=f"joint {types[at]}") for at, joint in enumerate(made.joints)),
     )
-    compile_build(nasty, tmp_path / "build", folds=0, rounds=8)
-    trier.open_file(tmp_path / "build" / "try.html")
-    assert trier.driver.title == "thenar: try a build"
+    compile_build(nasty, tmp_path / "build", folds=0, rounds=8, documents=Documents())
+    trier.open_file(tmp_path / "build" / "report.html", "#try")
+    assert trier.driver.title == "thenar: a build"
     assert trier.driver.find_elements(By.CSS_SELECTOR, "img, b, main script") == []
     heads = [row.text.removeprefix("▶ ") for row in trier.driver.find_elements(By.CSS_SELECTOR, "#bars th")]
     assert set(types) <= set(heads)
     trier.one("#hand [role=button] .area").click()
     assert trier.log() == []
-    assert trier.requests() == [(tmp_path / "build" / "try.html").as_uri()]
+    assert trier.requests() == [(tmp_path / "build" / "report.html").as_uri()]
 
 
 # ---- The parts that are Python's, in JavaScript ----

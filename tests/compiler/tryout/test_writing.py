@@ -5,12 +5,13 @@ import hashlib
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from thenar.compiler import compile_build
-from thenar.compiler.artifact.documents import Documents
+from thenar.compiler import adapt, compile_build
+from thenar.compiler.artifact.documents import Documents, report_of_build
 from thenar.compiler.pictures import PALETTE, embedded
 from thenar.compiler.report import tryout
 from thenar.compiler.report.tryout import MOST_BYTES, sample, scoped
@@ -26,7 +27,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_pages_policy_allows_only_its_script_and_style(build: Path) -> None:
-    page = (build / "try.html").read_text()
+    page = (build / "report.html").read_text()
     (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
     (script,) = re.findall(r'<script type="module">(.*?)</script>', page, re.DOTALL)
     (style,) = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
@@ -40,33 +41,48 @@ def test_the_pages_policy_allows_only_its_script_and_style(build: Path) -> None:
 
 
 def test_the_page_holds_the_very_tables_and_rows_of_every_type(build: Path) -> None:
-    page = (build / "try.html").read_text()
-    data = json.loads(re.findall(r'id="try-data">(.*?)</script>', page, re.DOTALL)[0])
+    page = (build / "report.html").read_text()
+    data = _data(build)
     assert base64.b64decode(data["tables"]) == (build / "tables.bin").read_bytes()
     assert data["hand"] == json.loads((build / "hand.json").read_bytes())
     manifest = json.loads((build / "build.json").read_bytes())
     assert {row[0] for row in data["rows"]} == set(range(len(manifest["grasps"])))
     assert len(page.encode()) <= MOST_BYTES
-    assert '<a href="try.html">' in (build / "report.html").read_text()
 
 
 def test_the_page_states_its_first_frame_and_empty_hand_knowledge(build: Path, tmp_path: Path) -> None:
-    page, warning = (build / "try.html").read_text(), "This build was trained without an empty hand"
-    assert ">All switches open, joints at the medians of the rows</button>" in page
+    page, warning = (build / "report.html").read_text(), "This build was trained without an empty hand"
+    assert ">All switches open, joints in the middle</button>" in page
     assert warning in page
-    compile_build(with_none(make_set()), tmp_path / "none", rounds=3, folds=0)
-    assert warning not in (tmp_path / "none" / "try.html").read_text()
+    compile_build(with_none(make_set()), tmp_path / "none", rounds=3, folds=0, documents=Documents())
+    assert warning not in (tmp_path / "none" / "report.html").read_text()
 
 
 def test_large_pages_hold_fewer_rows_or_are_omitted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    size = len((_compiled(tmp_path / "whole") / "try.html").read_bytes())
+    size = len(json.dumps(_data(_compiled(tmp_path / "whole")), separators=(",", ":")))
     monkeypatch.setattr(tryout, "MOST_BYTES", size - 500)
-    page = (_compiled(tmp_path / "less") / "try.html").read_bytes()
-    assert size - 700 < len(page) <= size - 500
-    monkeypatch.setattr(tryout, "MOST_BYTES", 20_000)
+    assert size - 700 < len(json.dumps(_data(_compiled(tmp_path / "less")), separators=(",", ":"))) <= size - 500
+    monkeypatch.setattr(tryout, "MOST_BYTES", 2_000)
     bare = _compiled(tmp_path / "none")
-    assert not (bare / "try.html").exists()
-    assert "try.html" not in (bare / "report.html").read_text()
+    assert list(_data(bare)) == ["hand"]
+    assert "too large for a page" in (bare / "report.html").read_text()
+
+
+def test_a_build_without_a_report_gets_one_made_of_its_folder(build: Path, tmp_path: Path) -> None:
+    assert report_of_build(build) == (build / "report.html").read_bytes()
+    compile_build(make_set(), tmp_path / "bare", rounds=3, folds=0)
+    page = _data(report_of_build(tmp_path / "bare"))
+    assert page == {**_data(build), "rows": [], "joints": page["joints"]}
+    assert _data(report_of_build(tmp_path / "bare", make_set())) == _data(build)
+    mine = adapt(tmp_path / "bare", make_set().rows(np.arange(12)), output=tmp_path / "mine").folder
+    assert "within subject" in report_of_build(mine).decode()
+
+
+def _data(page: Path | bytes) -> dict[str, Any]:
+    text = page.decode() if isinstance(page, bytes) else (page / "report.html").read_text()
+    found = re.findall(r'id="page-data">(.*?)</script>', text, re.DOTALL)[0]
+    data: dict[str, Any] = json.loads(found)
+    return data
 
 
 def _compiled(folder: Path) -> Path:

@@ -1,11 +1,14 @@
 """What the pages say of their own data, in a real browser: nothing old looks new, and only what is read is counted."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
 import pytest
+from msgspec import to_builtins
 from msgspec.structs import replace
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
 
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.web.server import Server, message
@@ -18,8 +21,8 @@ HAND = {
     **{"taxels": [], "joints": []},
 }
 BUILD = {
-    **{"grasps": ["Add", "PoS"], "switches": ["a", "b", "c"], "joints": []},
-    **{"preshapes": False, "records": False, "replay": False, "empty_hand": True},
+    **{"name": "build", "grasps": ["Add", "PoS"], "switches": ["a", "b", "c"], "joints": []},
+    **{"preshapes": False, "empty_hand": True},
 }
 SHELL = message("shell", project="bench", build="build 01234567", rate="", wearer="", pages=())
 GRASP = LiveGrasp(0, 0, 0, "Add", "Add", 0.95, 9, "ok", 2_000, None, 2_000)
@@ -50,12 +53,8 @@ class Run:
 
         self.browser.wait(shown)
 
-    def health(self, *devices: tuple[str, bool]) -> None:
-        told: Sequence[Mapping[str, object]] = [
-            {"name": name, "connected": connected, "error": "", "counts": []} for name, connected in devices
-        ]
-        empty = {"quarantined": ()}
-        self.server.publish("health", message("health", empty, switch_hz=0.0, glove_hz=0.0, devices=told))
+    def glove(self, level: str, words: str, lasts_s: float | None = None) -> None:
+        self.server.publish("glove", message("glove", {"is": level}, words=words, lasts_s=lasts_s))
 
     @property
     def old(self) -> bool:
@@ -84,7 +83,6 @@ def test_a_run_that_sends_nothing_more_is_grey_and_says_its_age(page: Callable[.
     assert browser.text("age").startswith("this is ")
     assert browser.text("age").endswith(" s old")
     browser.wait(lambda: browser.text("health") == "no data")
-    assert browser.text("glove-state").startswith("glove: silent since ")
     assert browser.driver.title == "no data · thenar"
     grey = "rgb(104, 112, 122)"
     browser.wait(lambda: browser.script(_INK, "grasp") == grey)
@@ -96,7 +94,9 @@ def test_a_run_that_sends_nothing_more_is_grey_and_says_its_age(page: Callable[.
 
 def test_a_page_without_its_server_says_since_when_there_is_no_data(page: Callable[..., Run], browser: Any) -> None:
     run = page()
-    run.until(lambda: browser.text("grasp") == "Add" and browser.text("build-state") == "build: build 01234567")
+    run.glove("good", "connected")
+    said = ("Add", "build: build 01234567", "glove: connected")
+    run.until(lambda: tuple(map(browser.text, ("grasp", "build-state", "glove-state"))) == said)
     run.server.close()
     browser.wait(lambda: browser.text("age").startswith("no data since "))
     assert run.old
@@ -120,15 +120,11 @@ def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run
         assert run.old == (number == 0 or age_s > 300)
 
 
-def test_lost_devices_are_named_and_only_readable_switches_counted(page: Callable[..., Run], browser: Any) -> None:
+def test_only_readable_switches_are_counted(page: Callable[..., Run], browser: Any) -> None:
     run = page()
-    run.health(("glove", True), ("stream", True))
-    connected = ("glove: connected", "2 of 3 switches closed: a, b")
-    run.until(lambda: (browser.text("glove-state"), browser.text("hand-says")) == connected)
-    run.health(("glove", True), ("stream", False))
+    run.until(lambda: browser.text("hand-says") == "2 of 3 switches closed: a, b")
     lost = replace(GRASP, grasp="unknown", candidate="unknown", health="unknown", lost=("a", "b", "c"))
     run.until(lambda: browser.text("hand-says") == "0 of 0 readable switches closed; 3 lost", grasp=lost)
-    browser.wait(lambda: browser.text("glove-state").startswith("glove: stream lost since "))
     part = replace(GRASP, health="degraded", lost=("a",))
     run.until(lambda: browser.text("hand-says") == "1 of 2 readable switches closed; 1 lost: b", grasp=part)
     # Both are silent: moments go on, but what they rest on is old.
@@ -157,39 +153,137 @@ def test_bars_and_numbers_are_of_one_frame(page: Callable[..., Run], browser: An
             assert words in ("", "–") or abs(float(words[:-2]) / 100 - float(bar[7:-1])) < 0.002
 
 
+def test_the_gloves_state_stands_in_the_bar_until_it_is_old(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    shown = "return document.getElementById('glove-state').checkVisibility()"
+    assert not browser.script(shown)
+    for level, words in (("good", "connected"), ("bad", "stream lost since 10:24:07"), ("warn", "not in use")):
+        run.glove(level, words)
+        browser.wait(lambda words=words: browser.text("glove-state") == f"glove: {words}")
+        assert browser.script("return document.getElementById('glove-state').dataset.is") == level
+        assert browser.script(shown)
+    run.glove("good", "connected", lasts_s=0.2)
+    browser.wait(lambda: browser.text("glove-state").startswith("glove: silent since "))
+    run.glove("good", "connected", lasts_s=3)
+    browser.wait(lambda: browser.text("glove-state") == "glove: connected")
+
+
 def test_a_past_that_ends_a_little_after_the_moment_is_kept(page: Callable[..., Run], browser: Any) -> None:
     run = page()
-    seconds = [(1_000_000 * number, number, ("Add", "PoS")[number % 2]) for number in range(1, 6)]
-    changes = [(time_us, "Add", "Add", "ok", "held", number, kind, time_us) for time_us, number, kind in seconds]
+    changes = [(10**6 * number, ("Add", "PoS")[number % 2], "", "Add", 10**6 * number) for number in range(1, 6)]
     run.server.publish("past", message("past", changes=changes, until_us=5_001_000))
     now = replace(GRASP, time_us=4_990_000, state="held", segment=4, segment_type="Add", segment_us=4_000_000)
     run.server.publish("frame", message("frame", now, **DETAIL))
-    browser.wait(lambda: len(browser.texts("#segments li")) == 5)
+    now = replace(now, time_us=5_002_000, segment_us=5_000_000)
+    run.server.publish("frame", message("frame", now, **DETAIL))
+    browser.wait(lambda: "announced Add" in browser.text("place"))
+    said = list[str]()
+    for _ in range(4):
+        press(browser, Keys.ARROW_LEFT)
+        said.append(browser.text("place"))
+    kinds = ["Add", "PoS", "Add", "PoS"]
+    browser.wait(lambda: f"announced {kinds[-1]}" in browser.text("place"))
+    assert "segment Add, 1.0 s" in browser.text("place")
 
 
-def test_a_recordings_wrong_predictions_are_marked_by_sign_and_words(browser: Any) -> None:
-    state = {"first_us": 0, "last_us": 9_000_000, "playing": False, "speed": 1.0, "share": 1.0, "faults": []}
-    predictions = [(0, "none"), (1_000_000, "Add"), (2_000_000, "unknown"), (5_000_000, "PoS")]
-    truth = [(500_000, 3_000_000, "Add"), (4_000_000, 8_000_000, "Add")]
-    with Server("live", "127.0.0.1:0", token=None) as server:
-        server.publish("build", message("build", BUILD | {"replay": True}))
-        server.publish("overview", message("overview", predictions=predictions, truth=truth))
-        browser.open(server.url)
-        for grasp, label, said in (
-            ("Add", "Add", "Truth: Add"),
-            ("PoS", "Add", "✗ Truth: Add, predicted: PoS"),
-            ("unknown", "Add", "Truth: Add"),
-            ("PoS", None, "Truth: no label"),
-        ):
-            server.publish("frame", message("frame", replace(GRASP, grasp=grasp), **DETAIL))
-            server.publish("replay", message("replay", state, at_us=6_000_000, truth=label))
-            browser.wait(lambda said=said: browser.text("truth") == said)
-            sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
-            assert ("✗" in browser.script(sign)) == said.startswith("✗")
-            if said.startswith("✗"):
-                browser.wait(lambda: browser.text("grasp") == "PoS")
-                browser.picture("wrong")
-        # Of the first label half a second of none, of the second all of PoS.
-        whole = browser.script("return document.getElementById('whole').getAttribute('aria-label')")
-        assert whole.endswith("2 labelled spans, 4 predictions, wrong in 2 spans")
+def test_a_new_build_and_a_new_server_go_on_with_the_past(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    run.until(lambda: browser.text("grasp") == "Add" and browser.text("place").startswith("now"))
+    assert browser.text("news") == ""
+    run.server.publish("build", message("build", BUILD | {"name": "build-2", "grasps": ["PoS", "Tip"]}))
+    browser.wait(lambda: browser.text("news") == "The run goes on with build-2, before it was build.")
+    other = replace(GRASP, grasp="PoS", candidate="PoS")
+    run.until(lambda: browser.text("grasp") == "PoS" and browser.texts("#types .name") == ["PoS", "Tip"], grasp=other)
+    assert browser.axe() == []
+    # Another server, of which the past begins later.
+    address = run.server.url.removeprefix("http://").strip("/")
+    run.server.close()
+    browser.wait(lambda: browser.text("age").startswith("no data since "))
+    with Server("live", address, token=None) as server:
+        server.publish("past", message("past", changes=[(10**8, "Tip", "", "", None)], until_us=10**8))
+        run.server, run._number = server, 10_000
+        run.until(lambda: browser.text("link").startswith("page: connected") and browser.text("age") == "")
+        browser.wait(lambda: browser.text("place").startswith("now"))
+        press(browser, Keys.HOME)
+        browser.wait(lambda: "announced Add" in browser.text("place"))
         browser.driver.get("about:blank")
+    browser.log()  # of the server that is gone
+
+
+def recording(predictions: list[Any], others: list[Any], truth: list[Any]) -> dict[str, Any]:
+    """Return what an overview says of two builds."""
+    changes = [[(time_us, grasp, "", "", None) for time_us, grasp in some] for some in (predictions, others)]
+    more = {"first_us": 0, "last_us": 9_000_000, "share": 1.0, "faults": []}
+    return {"have": [0, 0, 0], "changes": changes, "truth": truth, **more}
+
+
+def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
+    first = [(0, "none"), (1_000_000, "Add"), (2_000_000, "unknown"), (2_500_000, "Add"), (5_000_000, "PoS")]
+    second = [(0, "none"), (600_000, "Add"), (2_000_000, "PoS"), (2_200_000, "Add")]
+    truth = [(1, 500_000, 3_000_000, "Add"), (2, 4_000_000, 8_000_000, "Add"), (3, 8_500_000, 9_000_000, "PoS")]
+    overview = recording(first, second, [*truth, (4, 8_100_000, 8_200_000, "Add"), (4, 0, 0, "")])
+    about = BUILD | {"hand": HAND, "builds": ["old", "new"]}
+
+    def reply(asked: Any) -> bytes:
+        if asked["do"] == "overview":
+            if asked["numbers"] == [0, 0, 0]:
+                return message("overview", overview)
+            return message("overview", overview | {"have": asked["numbers"], "changes": [[], []], "truth": []})
+        at = asked["numbers"][0]
+        grasp = [grasp for time_us, grasp in first if time_us <= at][-1]
+        frame = {**to_builtins(replace(GRASP, grasp=grasp, time_us=at)), **DETAIL}
+        return message("moments", from_us=at, to_us=at, frames=[frame])
+
+    with Server("live", "127.0.0.1:0", token=None, on_message=reply) as server:
+        server.publish("replay", message("replay", about))
+        browser.open(server.url)
+        for seconds, grasp, said, other in (
+            (1.5, "Add", "Truth: Add", "new: Add"),
+            (2.1, "unknown", "Truth: Add", "✗ new: PoS"),
+            (3.5, "Add", "Truth: no label", "new: Add"),
+            (6.0, "PoS", "✗ Truth: Add, predicted: PoS", "new: Add"),
+            (8.15, "PoS", "Truth: no label", "new: Add"),
+        ):
+            browser.script("location.hash = `t=${arguments[0]}`", seconds)
+            texts = (grasp, said, other)
+            browser.wait(lambda texts=texts: tuple(map(browser.text, ("grasp", "truth", "beside"))) == texts)
+            wrong = said.startswith("✗")
+            sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
+            assert ("✗" in browser.script(sign)) == wrong
+            assert ("✗ old announced" in browser.text("place")) == wrong
+            assert browser.axe() == []
+            if wrong:
+                browser.picture("wrong")
+        # The trial of which the label was revoked counts nowhere.
+        rates = [f"{name} recognises 2 of 3 labelled trials, 67 %." for name in ("old", "new")]
+        rates += [
+            "Of them 1 by old alone, 1 by new alone.",
+            "A trial is recognised if its type was announced for longest.",
+        ]
+        assert browser.text("rates") == " ".join(rates)
+        # Errors follow each other; what comes before the first right one is none.
+        press(browser, Keys.HOME)
+        for at in ("2.00", "5.00", "8.50"):
+            press(browser, "n")
+            browser.wait(lambda at=at: browser.text("place").startswith(f"0:0{at} of 0:09.0"))
+        browser.click("last-error")
+        browser.wait(lambda: browser.text("place").startswith("0:05.00"))
+        red = browser.script(_RED)
+        assert [pytest.approx(share, abs=0.02) for share in red] == [(8.0 - 5.0) / 9, 0.2 / 9 + 0.5 / 9]
+        browser.driver.get("about:blank")
+
+
+# The share of each lane of errors that is red at its top.
+_RED = """const canvas = document.getElementById('timeline');
+    const pen = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d', { willReadFrequently: true });
+    pen.drawImage(canvas, 0, 0);
+    return [2, 4].map((lane) => {
+      const data = pen.getImageData(0, lane * 44 + 21, canvas.width, 1).data;
+      let red = 0;
+      for (let at = 0; at < data.length; at += 4) red += data[at] > 150 && data[at + 1] < 80;
+      return red / canvas.width;
+    });"""
+
+
+def press(browser: Any, *keys: str) -> None:
+    ActionChains(browser.driver).send_keys(*keys).perform()

@@ -182,6 +182,59 @@ def test_only_the_files_of_the_page_can_be_read(serve: Callable[..., Any], path:
     assert (answer.status, answer.content) == (404, b"There is no such page.\n")
 
 
+# Files to download.
+
+SCRIPT = b"<!doctype html><script>alert(1)</script>"
+
+
+def test_what_is_offered_is_saved_and_never_shown_as_a_page(serve: Callable[..., Any]) -> None:
+    client = serve()
+    answer = client.ask(client.server.offer("mine.html", SCRIPT))
+    assert (answer.status, answer.content) == (200, SCRIPT)
+    assert answer.headers["Content-Type"].partition(";")[0] == "application/octet-stream"
+    assert answer.headers["Content-Disposition"] == "attachment; filename*=UTF-8''mine.html"
+    assert answer.headers["X-Content-Type-Options"] == "nosniff"
+    assert answer.headers["Content-Security-Policy"] == guard.POLICY
+    assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
+
+
+@pytest.mark.parametrize("name", ["a\r\nSet-Cookie: b=c", '"; filename=../../x', "../../etc/passwd", "ä\udcff\0", ""])
+def test_the_name_of_what_is_offered_adds_no_header(serve: Callable[..., Any], name: str) -> None:
+    client = serve()
+    answer = client.ask(client.server.offer(name, SCRIPT))
+    assert answer.content == SCRIPT
+    assert "Set-Cookie" not in answer.headers
+    start, _, said = answer.headers["Content-Disposition"].partition("''")
+    assert start == "attachment; filename*=UTF-8"
+    assert set(said) <= set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-~%")
+
+
+def test_what_is_offered_is_guarded_as_all_else(serve: Callable[..., Any]) -> None:
+    client = serve(token=guard.new_token())
+    address = client.server.offer("mine.html", SCRIPT)
+    assert client.ask(address).status == 403
+    cookie = {"Cookie": f"{client.server._guard.cookie}={client.server._guard.secret}"}
+    assert client.ask(address, **cookie).content == SCRIPT
+    assert client.ask(address, Host=EVIL, **cookie).status == 403
+    assert client.ask(address, method="POST", **cookie).status == 405
+    assert client.ask(address, method="HEAD", **cookie).content == b""
+
+
+@pytest.mark.parametrize("path", ["/offered", "/offered/", "/offered/mine.html", "/offered/../server.py"])
+def test_what_is_not_offered_cannot_be_had(serve: Callable[..., Any], path: str) -> None:
+    client = serve()
+    address = client.server.offer("mine.html", SCRIPT)
+    for wrong in (path, f"{address}/", f"{address}/../wire.js", f"{address[:-1]}", address.upper()):
+        assert client.ask(wrong).status == 404
+
+
+def test_so_many_files_are_offered_and_the_oldest_goes(serve: Callable[..., Any]) -> None:
+    client = serve()
+    addresses = [client.server.offer("x", b"%d" % number) for number in range(9)]
+    assert len(set(addresses)) == 9
+    assert [client.ask(address).status for address in addresses] == [404, *8 * [200]]
+
+
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "PROPFIND"])
 def test_nothing_can_be_sent_but_through_the_websocket(serve: Callable[..., Any], method: str) -> None:
     client = serve()

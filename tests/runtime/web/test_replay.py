@@ -1,9 +1,11 @@
 """The page of a recording that no build recognised: what a build makes of it now, and what was labelled."""
 
 import hashlib
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from itertools import pairwise
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,8 @@ from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.web.replay import ReplayPage
+from thenar.runtime.web import replay as module
+from thenar.runtime.web.replay import MOST_MOMENTS, Replay
 
 NAMES = tuple(f"s{number}" for number in range(6))
 HARNESS = f'name = "mine"\n[[stream]]\nport = "/dev/none"\nswitches = {list(NAMES)}\n'.replace("'", '"')
@@ -53,41 +56,174 @@ def collected(path: Path, switches: tuple[str, ...], rows: tuple[int, ...]) -> P
     return path
 
 
+@pytest.fixture
+def replay(folder: Path, tmp_path: Path) -> Iterator[Callable[..., Replay]]:
+    """Return what reads a recording of these rows, whole."""
+    with ExitStack() as stack:
+
+        def start(*rows: int, builds: int = 1) -> Replay:
+            path = collected(tmp_path / "anna.mcap", NAMES, rows)
+            made = stack.enter_context(Replay(path, [folder] * builds))
+            assert made._scanned.wait(60)
+            return made
+
+        yield start
+
+
+def asked(replay: Replay, do: str, *numbers: object) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(replay.reply(do, numbers))
+    assert found["topic"] == do
+    return found
+
+
 def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
-    folder: Path, tmp_path: Path, hear: Callable[..., dict[str, Any]], visit: Callable[..., Any]
+    folder: Path, replay: Callable[..., Replay]
 ) -> None:
     build, rows = Build.load(folder), (0b101, 0b11010, 0b111111)
-    path = collected(tmp_path / "anna.mcap", NAMES, rows)
-    stop = Event()
-    with ReplayPage(path, "127.0.0.1:0", token=None, build=folder) as page:
-        thread = Thread(target=page.run, args=(stop,))
-        thread.start()
-        try:
-            assert page._scanned.wait(60)
-            first = page._first_us
-            assert first is not None
-            for number, row in enumerate(rows):
-                page._take({"do": "seek", "value": first + number * HELD_US + 900_000})
-                grasp = build.recognise(np.array([row >> bit & 1 for bit in range(6)], bool), np.zeros(0, int)).grasp
-                with visit(page.server).open() as live:
-                    while True:
-                        told = hear(live)
-                        if told["topic"] == "frame" and told["closed"] == f"{row:06b}"[::-1]:
-                            break
-                assert told["grasp"] == grasp
-            assert [span[2] for span in page._overview.truth] == ["hook", "pinch"]
-            begun, end, _ = page._overview.truth[1]
-            assert (begun - first, end - begun) == (HELD_US, HELD_US - 1)
-            assert page._overview.truth_at(begun) == "pinch"
-            assert page._overview.truth_at(begun - 1) is None
-            assert page._overview.truth_at(end) is None
-            assert page._faults == []
-        finally:
-            stop.set()
-            thread.join()
+    shown = replay(*rows)
+    overview = asked(shown, "overview", 0, 0)
+    first, last = overview["first_us"], overview["last_us"]
+    assert (overview["share"], overview["faults"]) == (1.0, [])
+    for number, row in enumerate(rows):
+        grasp = build.recognise(np.array([row >> bit & 1 for bit in range(6)], bool), np.zeros(0, int)).grasp
+        at = first + number * HELD_US + 900_000
+        frame = asked(shown, "moments", at, at, 1)["frames"][0]
+        assert (frame["closed"], frame["grasp"]) == (f"{row:06b}"[::-1], grasp)
+        assert at - 20_000 < frame["time_us"] <= at
+        announced = [change[1] for change in overview["changes"][0] if change[0] <= at][-1]
+        assert announced == grasp
+    # The last one is done again.
+    assert [(trial, end - begun, kind) for trial, begun, end, kind in overview["truth"]] == [
+        (1, HELD_US - 1, "hook"),
+        (2, HELD_US - 1, "pinch"),
+    ]
+    assert overview["truth"][1][1] - first == HELD_US
+    (final,) = asked(shown, "moments", last + 10**9, last + 2 * 10**9, 1)["frames"]
+    assert last - 10_000 <= final["time_us"] <= last
+    about = json.loads(shown.about)
+    assert (about["topic"], about["name"], about["builds"]) == ("replay", "anna.mcap", [folder.name])
+
+
+def test_a_result_that_is_undone_leaves_no_label(folder: Path, tmp_path: Path) -> None:
+    path, session = tmp_path / "undone.mcap", Session(thenar="1", switches=NAMES, sensors=(), harness=HARNESS)
+    with Recorder(path, session) as recorder:
+        for time_us, event, trial in ((0, "begun", 1), (9, "accepted", 1), (10, "undone", 1), (12, "begun", 1)):
+            recorder.label(Label(time_us, event, trial, "hook", "A", "cup"))  # type: ignore[arg-type]
+            recorder.frame(SwitchFrame(time_us, 1))
+    with Replay(path, [folder]) as shown:
+        assert shown._scanned.wait(60)
+        found = asked(shown, "overview", 0, 0)
+        assert found["truth"] == [[1, found["first_us"], found["first_us"] + 9, "hook"], [1, 0, 0, ""]]
+
+
+def test_pages_get_moments_of_the_span_and_interval_that_they_ask_for(replay: Callable[..., Replay]) -> None:
+    shown = replay(1, 2, 3)
+    overview = asked(shown, "overview", 0, 0)
+    first, last = overview["first_us"], overview["last_us"]
+    random = np.random.default_rng(2)
+    changes = [change[0] for change in overview["changes"][0]]
+    for _ in range(200):
+        begin, length = (int(number) for number in random.integers((first - 10**5, 0), (last + 10**5, 10**6)))
+        step = int(random.integers(1, 200_000))
+        found = asked(shown, "moments", begin, begin + length, step)
+        times = [frame["time_us"] for frame in found["frames"]]
+        assert times[0] <= max(begin, first)
+        assert all(later - earlier >= step for earlier, later in pairwise(times))
+        assert all(begin < time_us <= begin + length for time_us in times[1:])
+        # What it does not have, between two, is another moment so late or later: kept ones are 20 ms apart.
+        ends = [*times[1:], found["to_us"]]
+        assert all(later - earlier <= step + 20_000 for earlier, later in zip(times, ends[:-1], strict=False))
+        assert found["from_us"] == begin
+        assert (found["to_us"] == begin + length) == (len(times) < MOST_MOMENTS) or found["to_us"] >= times[-1]
+    # At a change of the announced type there is a moment, so that a page that goes there shows it.
+    for time_us in changes:
+        assert asked(shown, "moments", time_us, time_us, 1)["frames"][0]["time_us"] == time_us
+
+
+def test_the_overview_comes_in_parts_that_join(replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = replay(1, 2, 4, 8, 16, 32, builds=2)
+    whole = asked(shown, "overview", 0, 0, 0)
+    assert whole["changes"][0] == whole["changes"][1]
+    monkeypatch.setattr(module, "MOST_ENTRIES", 2)
+    lists: list[list[Any]] = [[], [], []]
+    while True:
+        part = asked(shown, "overview", *map(len, lists))
+        assert part["have"] == [len(each) for each in lists]
+        more = [*part["changes"], part["truth"]]
+        assert max(map(len, more)) <= 2
+        for each, some in zip(lists, more, strict=True):
+            each += some
+        if not any(more):
+            break
+    assert lists == [*whole["changes"], whole["truth"]]
+    assert len(whole["truth"]) == 5
+
+
+HUGE = 2**62
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        None,
+        "0,0,1",
+        {},
+        (),
+        (0, 1),
+        (0, 1, 2, 3),
+        (0, 1, None),
+        (0, 1, "1"),
+        (0, 1, True),
+        (0, 1.5, 1),
+        (0, float("nan"), 1),
+        (float("inf"), 1, 1),
+        (HUGE, 0, 1),
+        (0, -HUGE, 1),
+        (0, 0, 10**400),
+        [[0], 1, 1],
+    ],
+)
+def test_what_is_no_span_is_refused_in_a_sentence(replay: Callable[..., Replay], numbers: object) -> None:
+    shown = replay(1, 2)
+    for do in ("moments", "overview"):
+        with pytest.raises(SettingError, match=f"for the {do} of a recording, a page must send . whole numbers"):
+            shown.reply(do, numbers if do == "moments" or numbers != (0, 1) else (0, 1, 2))
+    for wrong in ("delete", "", None, 1, [], "x" * 10**6):
+        with pytest.raises(SettingError, match="a page can ask for the overview or for moments") as refusal:
+            shown.reply(wrong, (0, 1, 1))
+        assert len(str(refusal.value)) < 120
+
+
+def test_whatever_span_is_asked_for_a_reply_is_bounded(
+    replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = replay(*range(1, 9))
+    edges = (-HUGE + 1, -1, 0, 1, 10**6, 5 * 10**6, HUGE - 1)
+    for begin in edges:
+        for end in edges:
+            for step in edges:
+                found = asked(shown, "moments", begin, end, step)
+                assert 1 <= len(found["frames"]) <= MOST_MOMENTS
+            assert len(asked(shown, "overview", begin, end)["truth"]) <= 7
+    monkeypatch.setattr(module, "MOST_BYTES", 2_000)
+    text = shown.reply("moments", (0, HUGE - 1, 1))
+    largest = max(len(json.dumps(frame)) for frame in json.loads(text)["frames"])
+    assert len(text) < 2_000 + largest + 200
+
+
+def test_before_it_is_read_a_moment_is_not_claimed(folder: Path, tmp_path: Path) -> None:
+    path = collected(tmp_path / "anna.mcap", NAMES, (1, 2, 3))
+    with Replay(path, [folder]) as shown:
+        assert shown._scanned.wait(60)
+        last = shown._times[-1]
+        shown._scanned.clear()
+        found = asked(shown, "moments", last + 1, last + 10**6, 1)
+        assert (found["frames"], found["to_us"]) == ([], last)
+        found = asked(shown, "moments", last, last + 10**6, 1)
+        assert ([frame["time_us"] for frame in found["frames"]], found["to_us"]) == ([last], last)
 
 
 def test_a_recording_that_lacks_an_input_of_the_build_is_refused(folder: Path, tmp_path: Path) -> None:
     path = collected(tmp_path / "few.mcap", NAMES[:4], (1, 2))
     with pytest.raises(SettingError, match="recorded without s4"):
-        ReplayPage(path, "127.0.0.1:0", token=None, build=folder)
+        Replay(path, [folder])

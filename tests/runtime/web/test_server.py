@@ -22,8 +22,10 @@ def test_a_page_its_files_and_the_newest_message_of_each_topic(
         assert hear(live) == {"topic": "build", "name": "first"}
         assert hear(live) == {"topic": "frame", "number": 2}
         client.server.publish("frame", message("frame", number=3))
-        while (told := hear(live))["number"] != 3:
-            assert told == {"topic": "frame", "number": 2}
+        # What was sent on opening may come once more.
+        first = ({"topic": "build", "name": "first"}, {"topic": "frame", "number": 2})
+        while (told := hear(live)) != {"topic": "frame", "number": 3}:
+            assert told in first
 
 
 def test_a_page_gets_the_topics_that_it_names(serve: Callable[..., Any], hear: Callable[..., Any]) -> None:
@@ -31,10 +33,10 @@ def test_a_page_gets_the_topics_that_it_names(serve: Callable[..., Any], hear: C
     for topic in ("build", "frame"):
         client.server.publish(topic, message(topic))
     with client.open("/live?topics=frame,health") as live:
-        assert hear(live) == {"topic": "frame"}
         client.server.publish("build", message("build", number=2))
         client.server.publish("health", message("health"))
-        assert hear(live) == {"topic": "health"}
+        while (told := hear(live)) != {"topic": "health"}:
+            assert told == {"topic": "frame"}
 
 
 def test_what_a_page_asks_for_is_handed_on_and_a_refusal_told(

@@ -51,6 +51,6 @@ def test_the_extra_time_is_on_average_what_was_said() -> None:
 def test_a_scan_that_lasts_longer_than_a_frame_is_refused(parameters: dict[str, Any]) -> None:
     prepare(make_setting(timed=True, period_us=1010), **parameters)
     with pytest.raises(
-        SceneError, match=r"effects\.bus\.latency: 10 ports take 1010 us .* period of frames is 1009 us"
+        SceneError, match=r"effects\.bus\.latency: 10 ports take 1010 µs .* period of frames is 1009 µs"
     ):
         prepare(make_setting(timed=True, period_us=1009), **parameters)

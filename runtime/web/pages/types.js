@@ -1,0 +1,80 @@
+// A colour and a short code for each type, the same on all pages.
+
+// Okabe and Ito's colours, which colour-blind people can distinguish, and darker and paler ones for further types.
+const COLOURS = [
+  "#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#8a8a8a",
+  "#003f66", "#8f6300", "#00543d", "#7a3d60", "#b5dcf5", "#7a2d00", "#a3c585", "#4b4f9e",
+];
+const NO_TYPES = { none: "–", unknown: "?" };
+
+/**
+ * Return the style of each type, by its name: a `code` of one to three letters that no other has, whatever their case;
+ * a `colour`, which another has only if there are more than 16; and the `ink` to write on it. None and unknown are no
+ * types: their code is a sign, and they have no colour. The order of the names has no effect.
+ */
+export function typeStyles(names) {
+  const styles = new Map(), codes = new Set(), colours = new Set();
+  for (const name of [...new Set(names)].sort()) {
+    if (Object.hasOwn(NO_TYPES, name)) {
+      styles.set(name, { code: NO_TYPES[name], colour: null, ink: null });
+      continue;
+    }
+    const code = candidates(name).find((one) => !codes.has(one.toLowerCase()));
+    codes.add(code.toLowerCase());
+    if (colours.size === COLOURS.length) colours.clear();
+    let at = hash(name) % COLOURS.length;
+    while (colours.has(at)) at = (at + 1) % COLOURS.length;
+    colours.add(at);
+    styles.set(name, { code, colour: COLOURS[at], ink: inkOn(COLOURS[at]) });
+  }
+  return styles;
+}
+
+/** Return an element that shows a type's code on its colour; what it is called stands beside it. */
+export function chip({ code, colour, ink }) {
+  const made = document.createElement("span");
+  made.className = "chip";
+  made.setAttribute("aria-hidden", "true");
+  made.textContent = code;
+  if (colour) [made.style.background, made.style.color] = [colour, ink];
+  return made;
+}
+
+/** Return an element with the code of a type, and its name where that differs. */
+export function tag(styles, name) {
+  const made = document.createElement("span"), style = styles.get(name), text = document.createElement("span");
+  text.textContent = name;
+  text.className = style.code === name ? "unseen" : "";
+  made.append(chip(style), style.code === name ? "" : " ", text);
+  return made;
+}
+
+// The best first: a short name itself, the initials of several words, two letters, three, a letter with a number.
+function candidates(name) {
+  const letters = name.match(/[\p{L}\p{N}]/gu) ?? ["T"], [first, ...rest] = letters;
+  const words = name.match(/[\p{L}\p{N}]+/gu) ?? [];
+  const initials = words.map(([letter]) => letter).slice(0, 3).join("");
+  const numbers = Array.from({ length: 36 ** 2 }, (_, number) => first + number.toString(36));
+  return [
+    ...(words.length === 1 && letters.length <= 3 ? [letters.join("")] : []),
+    ...(words.length > 1 ? [initials.toUpperCase()] : []),
+    ...rest.map((letter) => first.toUpperCase() + letter),
+    ...rest.slice(1).map((letter) => first.toUpperCase() + rest[0] + letter),
+    ...numbers,
+  ];
+}
+
+function hash(name) {
+  let found = 7;
+  for (const letter of name) found = (Math.imul(found, 31) + letter.codePointAt(0)) >>> 0;
+  return found;
+}
+
+// Black or white: one of them always has a contrast of 4.5 or more.
+function inkOn(colour) {
+  const [red, green, blue] = [1, 3, 5].map((at) => {
+    const share = parseInt(colour.slice(at, at + 2), 16) / 255;
+    return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
+  });
+  return 0.2126 * red + 0.7152 * green + 0.0722 * blue > 0.179 ? "#000000" : "#ffffff";
+}

@@ -1,0 +1,150 @@
+"""The page *Compare*: two builds on the same trials and on one hand; and what is exported of a build."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from shlex import join, quote
+
+from thenar.compiler.artifact.comparing import BuildComparison, compare_builds
+from thenar.compiler.artifact.documents import REPORT_NAME, report_of_build
+from thenar.compiler.facts import SensorCount
+from thenar.compiler.firmware.generate import firmware_files, write_folder
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.glove.propose import propose_harness
+from thenar.drivers.errors import SettingError
+from thenar.runtime.build import TABLES_NAME, Build
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.files import write_atomically
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.timing import scan_us
+from thenar.runtime.web.server import message
+
+from .choose import drawn
+from .project import Project
+from .studio import Asked, Handler, Report, Studio
+
+
+def add_compare_page(studio: Studio) -> None:
+    """Add the page *Compare* to a studio."""
+    requests: dict[str, Handler] = {
+        "compare": partial(_later, studio),
+        "comparison": partial(_comparison, studio),
+        "commands": partial(_commands, studio),
+        **dict.fromkeys(("report", "firmware"), partial(_queue, studio)),
+    }
+    studio.add("compare.html", "Compare", requests)
+    studio.publish("targets", message("targets", targets=[(name, target.help) for name, target in TARGETS.items()]))
+
+
+def _chosen(studio: Studio, asked: Asked) -> tuple[list[Path], list[Path]]:
+    """Return two builds, and sets, or all in use. Raises SettingError for other ids."""
+    if len(asked.ids) < 2 or asked.ids[0] == asked.ids[1]:
+        raise SettingError("choose two builds to compare")
+    sets = [studio.project.path("set", member) for member in asked.ids[2:]]
+    return [studio.project.path("build", member) for member in asked.ids[:2]], sets or studio.project.sets()
+
+
+def _later(studio: Studio, asked: Asked) -> None:
+    builds, sets = _chosen(studio, asked)
+    studio.queue("compare", partial(_compare, studio, asked.ids, builds, sets))
+
+
+def _comparison(studio: Studio, asked: Asked) -> bytes:
+    """Return the command that compares two builds."""
+    builds, sets = _chosen(studio, asked)
+    first, recordings = studio.project.joined(sets)
+    return message("comparison", command=f"{first}{join(['thenar', 'compare', *map(str, builds)])} {recordings}")
+
+
+def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Sequence[Path], report: Report) -> None:
+    project, builds = studio.project, [Build.load(path) for path in paths]
+    grasp_set, _, unused = project.recordings(sets)
+    found = compare_builds(paths[0], paths[1], grasp_set, report)
+    kept = [_sensors(build.manifest) for build in builds]
+    prices = {name: part.price for name, part in project.parts(list({**kept[0], **kept[1]})).items()}
+    shown = [
+        {
+            "name": path.name,
+            "right": right,
+            "ends": ends,
+            "sensors": str(SensorCount.of_build(build.manifest)),
+            "scan_us": _scan_us(project, build.manifest),
+            "bytes": (path / TABLES_NAME).stat().st_size,
+            "price": sum(prices[name] for name in names) if prices else None,
+            "stated": str(build.manifest.headline or "not measured"),
+        }
+        for path, build, names, right, ends in zip(paths, builds, kept, (found.a, found.b), found.ends, strict=True)
+    ]
+    about = {
+        "hand": drawn(grasp_set, project.hand().fitted(grasp_set.element_names)),
+        "builds": shown,
+        "both": [name for name in kept[0] if name in kept[1]],
+        "only": [[name for name in one if name not in other] for one, other in (kept, kept[::-1])],
+        "found": found,
+        "said": _said(found, *(path.name for path in paths)),
+        "unused": unused,
+    }
+    studio.publish("compare", message("compare", about, ids=ids))
+
+
+def _sensors(manifest: Manifest) -> dict[str, None]:
+    """Return the names of the switches, pads and joints that a build reads, each once."""
+    return dict.fromkeys([switch.source for switch in manifest.switches] + [joint.name for joint in manifest.joints])
+
+
+def _scan_us(project: Project, manifest: Manifest) -> float | None:
+    """Return the time of a scan of a build's switches and pads, on the project's harness or on a proposed one; None if
+    that does not read them.
+    """
+    names = [switch.name for switch in manifest.switches]
+    try:
+        harness = project.wiring() if project.harness.exists() else propose_harness(names)
+        scan = plan_scan(names, harness)
+    except HarnessError:
+        return None
+    return scan_us(scan, harness).us if scan.ports else 0.0
+
+
+def _said(found: BuildComparison, a: str, b: str) -> str:
+    """Return the difference of build b from build a in a sentence."""
+    middle, low, high = (100 * share for share in (found.difference, found.low, found.high))
+    ahead = f"{b} is {middle:.1f} points better" if middle else f"{a} and {b} are equally good"
+    if middle < 0:
+        ahead, low, high = f"{a} is {-middle:.1f} points better", -high, -low
+    return f"{ahead} [{low:.1f}, {high:.1f}], on {found.trials} {found.of}"
+
+
+def _places(project: Project, asked: Asked) -> tuple[Path, Path, Path]:
+    """Return the folder of a build, and the file and the folder to export to. Raises SettingError for another id, and
+    for a name that is no target.
+    """
+    build, target = project.path("build", asked.id), TARGETS.named(asked.name)
+    return build, project.new_path(build.name, ".html"), project.new_path(f"{build.name}-{target.name}")
+
+
+def _commands(studio: Studio, asked: Asked) -> bytes:
+    """Return the commands that export what the buttons do."""
+    build, page, folder = _places(studio.project, asked)
+    firmware = ["thenar", "firmware", str(build), "--target", asked.name, "-o", str(folder)]
+    report = ["cp", str(build / REPORT_NAME), str(page)] if (build / REPORT_NAME).exists() else []
+    return message("commands", report=join(report), firmware=join(firmware))
+
+
+def _queue(studio: Studio, asked: Asked) -> None:
+    _places(studio.project, asked)
+    studio.queue(asked.do, partial(_export, studio, asked))
+
+
+def _export(studio: Studio, asked: Asked, _: Report) -> None:
+    """Write a build's report, or its firmware, into the project, and tell all pages where."""
+    build, page, folder = _places(studio.project, asked)
+    if asked.do == "firmware":
+        loaded = Build.load(build)
+        write_folder(firmware_files(loaded.tables, loaded.manifest, asked.name), folder)
+        said, address = TARGETS[asked.name].next_step.format(folder=quote(str(folder))), ""
+    else:
+        content = report_of_build(build)
+        write_atomically(page, content)
+        said, address = f"{page} works offline, in any browser", studio.server.offer(page.name, content)
+    studio.publish("exported", message("exported", said=said, address=address, name=page.name))

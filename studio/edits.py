@@ -1,0 +1,69 @@
+"""The log of edits of a project: a page relabels trials, leaves them out, and takes this back.
+
+Each is appended, also an undo, which edits the trials back; the recordings stay as they are.
+"""
+
+import os
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+
+from thenar.compiler.recordings.edits import Edit, TrialId, read_edits
+from thenar.drivers.errors import SettingError
+from thenar.runtime.files import sync_folder
+
+
+def load_edits(path: Path) -> tuple[list[Edit], str]:
+    """Return what `read_edits` does, and no edits if there is no file."""
+    return read_edits(path) if path.exists() else ([], "")
+
+
+def change(path: Path, trials: Sequence[TrialId], new: str) -> None:
+    """Make trials this type in one action; an empty type leaves them out.
+
+    Raises SettingError if all trials are so already, RecordingError for a damaged log, and OSError.
+    """
+    edits = load_edits(path)[0]
+    now = {edit.of: edit.new for edit in edits}
+    changed = [trial for trial in dict.fromkeys(trials) if now.get(trial, trial[3]) != new]
+    if not changed:
+        raise SettingError("these trials are left out already" if not new else f"these trials are {new} already")
+    _append(path, edits, [(trial, now.get(trial, trial[3]), new) for trial in changed])
+
+
+def undo(path: Path) -> None:
+    """Take back the last action that was not taken back yet.
+
+    Raises SettingError if there is none, RecordingError for a damaged log, and OSError.
+    """
+    edits = load_edits(path)[0]
+    last = last_action(edits)
+    if not last:
+        raise SettingError("there is nothing to undo")
+    _append(path, edits, [(edit.of, edit.new, edit.old) for edit in last], last[0].action)
+
+
+def last_action(edits: Sequence[Edit]) -> list[Edit]:
+    """Return the edits of the last action that was not taken back yet."""
+    undone = {edit.undo for edit in edits}
+    left = [edit for edit in edits if not edit.undo and edit.action not in undone]
+    return [edit for edit in left if edit.action == left[-1].action]
+
+
+def _append(path: Path, edits: Sequence[Edit], changes: Sequence[tuple[TrialId, str, str]], undo: int = 0) -> None:
+    """Append an action: for each trial the type before and after. It is on the disk before this returns."""
+    action = 1 + max((edit.action for edit in edits), default=0)
+    time = datetime.now(UTC).isoformat(timespec="seconds")
+    made = [Edit(time, action, *trial, old, new, undo) for trial, old, new in changes]
+    text = b"".join(msgspec.json.encode(edit) + b"\n" for edit in made)
+    with path.open("a+b") as file:
+        file.seek(0)
+        good = b"".join(file.read().splitlines(keepends=True)[: len(edits)])
+        # What a killed writer left of a line goes.
+        file.truncate(len(good))
+        file.write((b"\n" if good and not good.endswith(b"\n") else b"") + text)
+        file.flush()
+        os.fsync(file.fileno())
+    sync_folder(path.parent)

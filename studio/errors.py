@@ -1,0 +1,178 @@
+"""The page *Errors*: which trials are misread, by chosen sensors or by the build in use, and edits of trials.
+
+A page names trials by their numbers; an edit also says which numbering they are of, so that none is for another trial.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.compiler.artifact.training import trained_on
+from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.recogniser import predicted_classes
+from thenar.compiler.recordings.edits import named
+from thenar.compiler.samples import decided, select_inputs
+from thenar.compiler.text import counted
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.build import Build
+from thenar.runtime.model.terms.bit import Bit
+from thenar.runtime.names import shortened
+from thenar.runtime.web.server import message
+
+from .choose import ChoosePage
+from .edits import change, last_action, load_edits, undo
+from .quick import QuickAccuracy, strongest
+from .studio import Asked, Handler, Report, Studio
+
+# A page shows so many trials at a time.
+_MOST_SHOWN = 48
+
+
+class BuildReading:
+    """How a build recognises the trials of recordings.
+
+    Parameters
+    ----------
+    name : str
+        The name of its folder.
+    build : Build
+        The build.
+    quick : QuickAccuracy
+        The recordings.
+
+    Attributes
+    ----------
+    types : list of str
+        The types of the recordings, and then those that only the build has.
+    read : (T,) array of intp
+        The number in `types` of what each trial is recognised as.
+    sensors : tuple of int
+        The numbers of the sensors that the build reads.
+    about : dict
+        What a page shows of it.
+
+    Raises
+    ------
+    CompileError
+        If the recordings lack inputs of the build.
+    """
+
+    def __init__(self, name: str, build: Build, quick: QuickAccuracy) -> None:
+        self._build, self._quick = build, quick
+        self._bits, self._codes = select_inputs(quick.held, build.manifest)
+        self.types = list(dict.fromkeys((*quick.grasps, *build.classes)))
+        numbers = np.array([self.types.index(one) for one in build.classes])
+        rows = predicted_classes(build.tables, build.manifest.rejection, self._bits, self._codes)
+        self.read = decided(numbers[rows][np.newaxis], quick.trial)[0]
+        people = np.unique(quick.held.subjects, return_inverse=True)[1]
+        rate = Rate.predicted(numbers[rows], quick.truth[quick.trial], quick.trial, of="pooled", groups=people)
+        known = int(np.count_nonzero(trained_on(build.manifest, quick.held)))
+        of = f"{known} of these {len(quick.truth)} trials trained it" if known else "none of these trials trained it"
+        read = [*(one.source for one in build.manifest.switches), *(joint.name for joint in build.manifest.joints)]
+        self.sensors = tuple(sorted({quick.names.index(one) for one in read}))
+        self._usual = dict[int, NDArray[np.float64]]()
+        self.about = {"of": f"build {name}; {of}", "mean": rate.mean, "low": rate.low, "high": rate.high}
+
+    def decisive(self, trial: int) -> list[int]:
+        """Return the sensors that decided for the wrong type of a misread trial, the strongest first; at most 3.
+
+        Their terms add more to the recognised type than to the true one, compared with other trials of the true type.
+        """
+        truth, read, known = int(self._quick.truth[trial]), int(self.read[trial]), self._build.grasps
+        # A refused frame has no type, and a build may not know a type.
+        if truth == read or not {self.types[truth], self.types[read]} <= {*known}:
+            return []
+        if truth not in self._usual:
+            self._usual[truth] = self._sums(np.flatnonzero(self._quick.truth[self._quick.trial] == truth))
+        places = [known.index(self.types[one]) for one in (read, truth)]
+        more = self._sums(self._quick.rows_of(trial)) - self._usual[truth]
+        return strongest(more[:, places[0]] - more[:, places[1]])
+
+    def _sums(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return what each sensor adds to each type (d, K) on average of these rows."""
+        tables, manifest = self._build.tables, self._build.manifest
+        sums = np.zeros((len(self._quick.names), tables.n_classes))
+        switches, joints = [one.source for one in manifest.switches], [joint.name for joint in manifest.joints]
+        for term in tables.terms:
+            names = switches if isinstance(term, Bit) else joints
+            values = tables.values(term, self._bits[rows], self._codes[rows])
+            for number in term.inputs:
+                sums[self._quick.names.index(names[number])] += term.of(*values).mean(axis=0) / len(term.inputs)
+        return sums
+
+
+class ErrorsPage:
+    """The page *Errors* of a studio, which shows what `choose` has read."""
+
+    def __init__(self, studio: Studio, choose: ChoosePage) -> None:
+        self._studio, self._project, self._choose = studio, studio.project, choose
+        self._build: BuildReading | None = None
+        requests: dict[str, Handler] = {"errors": self._errors, "trials": self._trials}
+        studio.add("errors.html", "Errors", requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
+
+    def read(self, report: Report) -> None:
+        """Let the build in use recognise the recordings, if it can, and show what was edited."""
+        self._build, built, name, why = None, self._project.build(), "", ""
+        if built is not None:
+            name = built[0].name
+            try:
+                self._build = BuildReading(name, built[1], self._choose.known)
+            except ThenarError as reason:
+                name, why = "", f"build {name} is left out: {reason}"
+        self._studio.publish("recogniser", message("recogniser", build=name, why=why))
+        self._tell_edits()
+
+    def _errors(self, asked: Asked) -> bytes:
+        """Return what the sensors, or the build, make of every trial."""
+        quick, sensors = self._choose.known, asked.sensors
+        if asked.name == "build":
+            sensors = self._reading.sensors
+            about = {"types": self._reading.types, "read": self._reading.read.tolist(), **self._reading.about}
+        else:
+            found = quick.of(sensors)
+            about = {"types": quick.grasps, "read": found.read, "mean": found.mean, "low": found.low}
+            about |= {"high": found.high, "of": f"{found.of}; quick: not nested"}
+        places = quick.places(sensors).tolist()
+        about |= {"truth": quick.truth.tolist(), "places": places, "numbering": self._choose.numbered[1]}
+        return message("errors", about, sensors=sensors, asked=(asked.name, asked.sensors))
+
+    def _trials(self, asked: Asked) -> bytes:
+        """Return what sensors showed in trials, and which decided where one was misread."""
+        quick, shown = self._choose.known, list[dict[str, object]]()
+        typical = {kind: [*map(float, shares)] for kind, shares in zip(quick.grasps, quick.typical, strict=True)}
+        for trial in asked.trials[:_MOST_SHOWN]:
+            decisive = self._reading.decisive(trial) if asked.name == "build" else quick.decisive(trial, asked.sensors)
+            shown.append({"trial": trial, "shown": quick.seen(trial).tolist(), "decisive": decisive})
+        return message("trials", trials=shown, typical=typical, asked=asked.trials)
+
+    @property
+    def _reading(self) -> BuildReading:
+        if self._build is None:
+            raise ThenarError("no build of this project recognises these recordings: train one")
+        return self._build
+
+    def _edit(self, asked: Asked) -> None:
+        """Make trials another type, leave them out if it is empty, or take the last action back; then read again.
+
+        Raises ThenarError for a numbering of earlier recordings, and for another trial or type.
+        """
+        log = self._project.edits
+        if asked.do == "undo":
+            undo(log)
+        else:
+            trials, numbering = self._choose.numbered
+            if asked.id != numbering:
+                raise ThenarError("the recordings have changed: look at these trials again")
+            if not all(0 <= trial < len(trials) for trial in asked.trials):
+                raise ThenarError(f"there are {len(trials)} trials, numbered from 0")
+            if asked.name not in ("", *self._choose.types):
+                raise ThenarError(f"{shortened(repr(asked.name))} is not a grasp type of these recordings")
+            change(log, [trials[trial] for trial in asked.trials], asked.name)
+        self._tell_edits()
+        self._studio.changed()
+
+    def _tell_edits(self) -> None:
+        """Show the last action that can be taken back."""
+        last = last_action(load_edits(self._project.edits)[0])
+        what = counted(len(last), "trial") if len(last) > 1 else named(last[0].of) if last else ""
+        done = f"{what} {f'made {last[0].new}' if last[0].new else 'left out'}" if last else ""
+        self._studio.publish("edits", message("edits", words=done))

@@ -1,0 +1,307 @@
+// The page Errors: which trials are misread, in a matrix and on a map; the selected ones as small hands; and their edits.
+import { button, interval, storedChoice } from "./choice.js";
+import { drawHand } from "./hand.js";
+import { TrialMap } from "./map.js";
+import { openPage } from "./shell.js";
+import { chip, typeStyles } from "./types.js";
+import { cell, list, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+const percent = (share) => `${Math.round(100 * share)} %`;
+const STEP = 24; // so many trials are shown at a time
+const SVG = "http://www.w3.org/2000/svg";
+
+let set = null; // the message on the set
+let drawn = null; // the message on the hand
+let reply = null; // what the recogniser makes of every trial
+let styles = new Map();
+let errors = []; // numbers of misread trials
+let last = -1; // the last of them that was shown
+let selected = []; // numbers of trials
+let asked = []; // of these, those of the last request
+
+const map = new TrialMap($("map"), {
+  point: (trial) => say($("pointed"), trial < 0 ? "\u00a0" : named(trial)),
+  select: (trials) => select(trials),
+});
+
+const ask = openPage({
+  open: () => set && look(),
+  set: (message) => {
+    if (set && set.numbering === message.numbering && set.why === message.why) return;
+    // Where a trial was left out, the next one has its number.
+    last -= 1;
+    set = message;
+    $("empty").hidden = !set.why;
+    $("with-set").hidden = Boolean(set.why);
+    say($("empty"), set.why);
+    if (set.why) return;
+    list($("unused"), set.unused);
+    styles = typeStyles(set.types);
+    $("type").replaceChildren(...set.types.map((name) => new Option(name)));
+    select([]);
+    look();
+  },
+  sensors: (message) => (drawn = message),
+  recogniser: ({ build, why }) => {
+    const option = $("of").querySelector("[value=build]") ?? new Option("", "build");
+    option.textContent = `build ${build}`;
+    if (build) $("of").append(option);
+    else option.remove();
+    if (set && !set.why) list($("unused"), [...set.unused, ...(why ? [why] : [])]);
+    if (set && !set.why) look();
+  },
+  edits: ({ words }) => {
+    $("undo").disabled = !words;
+    say($("edited"), words && `Last edit: ${words}.`);
+  },
+  errors: (message) => {
+    if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
+  },
+  trials: (message) => {
+    if (String(message.asked) === String(asked)) showTrials(message);
+  },
+});
+
+function request() {
+  const of = $("of").value, every = set.sensors.map((_, sensor) => sensor);
+  return [of, of === "all" ? every : of === "chosen" ? storedChoice(set.sensors) : []];
+}
+
+function look() {
+  const [name, sensors] = request();
+  ask("errors", { name, sensors });
+}
+
+const type = (number) => reply.types[number];
+const misread = (trial) => reply.truth[trial] !== reply.read[trial];
+
+function named(trial) {
+  const read = misread(trial) ? `, recognised as ${type(reply.read[trial])}` : "";
+  return `${set.trials[trial]}: ${type(reply.truth[trial])}${read}`;
+}
+
+function show(message) {
+  reply = message;
+  errors = reply.truth.flatMap((_, trial) => (misread(trial) ? [trial] : []));
+  say($("rate"), interval(reply));
+  const using = reply.sensors.length ? `${reply.sensors.length} sensors` : "no sensor: choose some on the page Choose";
+  say($("about"), `${reply.of}; ${using}; ${errors.length} of ${reply.truth.length} trials misread`);
+  for (const id of ["next", "previous", "all-errors"]) $(id).disabled = !errors.length;
+  const trials = reply.types.map(() => []);
+  reply.truth.forEach((truth, trial) => trials[truth].push(trial));
+  for (const name of reply.types) if (!styles.has(name)) styles = typeStyles([...set.types, ...reply.types]);
+  matrix(trials);
+  const looks = reply.truth.map((truth, trial) => ({ colour: styles.get(type(truth)).colour ?? "#8a8a8a", wrong: misread(trial) }));
+  const labels = trials.flatMap((those, kind) => (those.length ? [{ code: styles.get(type(kind)).code, trials: those }] : []));
+  map.show(reply.places, looks, labels);
+  const entries = reply.types.filter((_, kind) => trials[kind].length).map((name) => {
+    const entry = document.createElement("li");
+    entry.append(...tag(name));
+    return entry;
+  });
+  $("legend").replaceChildren(...entries);
+  // A link of the page Compare names a trial and its type.
+  const linked = decodeURIComponent(location.hash.slice(1));
+  if (linked) {
+    history.replaceState(null, "", location.pathname);
+    selected = reply.truth.flatMap((truth, trial) => (`${set.trials[trial].replace(/, session .*/, "")}: ${type(truth)}` === linked ? [trial] : []));
+  }
+  select(selected.filter((trial) => trial < reply.truth.length));
+}
+
+/* ---- The matrix: its numbers and the names of its rows select trials ---- */
+
+function matrix(trials) {
+  const head = document.createElement("tr"), body = document.createElement("tbody");
+  head.append(document.createElement("td"), ...reply.types.map((name) => column(name)));
+  body.append(head);
+  trials.forEach((those, truth) => {
+    if (!those.length) return;
+    const row = document.createElement("tr"), title = cell("th", ""), name = type(truth);
+    const wrong = those.filter(misread), made = button(name, () => select(wrong));
+    made.className = "plain";
+    made.disabled = !wrong.length;
+    made.setAttribute("aria-label", `${name}: select its ${wrong.length} errors`);
+    made.replaceChildren(...tag(name));
+    title.append(made);
+    row.append(title);
+    reply.types.forEach((other, read) => {
+      const some = those.filter((trial) => reply.read[trial] === read), place = cell("td", "");
+      if (some.length) {
+        const number = button(some.length, () => select(some));
+        number.className = "plain";
+        number.setAttribute("aria-label", `${some.length} trials of ${name} recognised as ${other}`);
+        place.dataset.is = truth === read ? "good" : "bad";
+        place.append(number);
+      }
+      row.append(place);
+    });
+    body.append(row);
+  });
+  $("confusion").replaceChildren(body);
+}
+
+function column(name) {
+  const made = cell("th", "");
+  made.scope = "col";
+  made.title = name;
+  made.append(...tag(name, true));
+  return made;
+}
+
+/** Return the code and the name of a type; the name is not shown where it is the code, or with `short`. */
+function tag(name, short = false) {
+  const style = styles.get(name), whole = document.createElement("span");
+  whole.textContent = name;
+  whole.className = short || style.code === name ? "unseen" : "";
+  return [chip(style), whole.className ? "" : " ", whole];
+}
+
+/* ---- The selected trials ---- */
+
+function select(trials) {
+  selected = trials;
+  $("selected").hidden = !trials.length;
+  $("trials").replaceChildren();
+  mark();
+  if (!trials.length) return;
+  askFor(0);
+  // On a phone they are further down.
+  $("selection").scrollIntoView({ block: "nearest" });
+}
+
+function askFor(from) {
+  asked = selected.slice(from, from + STEP);
+  $("show-more").hidden = selected.length <= from + STEP;
+  ask("trials", { name: $("of").value, sensors: reply.sensors, trials: asked });
+}
+
+/** Return the numbers of the selected trials whose box is checked, shown or not. */
+function chosen() {
+  const boxes = [...$("trials").querySelectorAll("input")];
+  const left = new Set(boxes.filter((box) => !box.checked).map((box) => Number(box.value)));
+  return selected.filter((trial) => !left.has(trial));
+}
+
+/** Show how many trials are selected, and offer what can be done with them. */
+function mark() {
+  const trials = chosen(), count = `${trials.length} ${trials.length === 1 ? "trial" : "trials"}`;
+  map.select(trials);
+  const what = selected.length === 1 ? named(selected[0]) : `${trials.length ? count : "No trial"} selected`;
+  say($("selection-heading"), what);
+  for (const id of ["relabel", "drop"]) $(id).disabled = !trials.length;
+  say($("relabel"), `Relabel ${count}`);
+  say($("drop"), `Leave out ${count}`);
+  const pair = pairOf(selected);
+  if (pair.length === 2) $("type").value = type(pair[1]);
+  $("more").hidden = pair.length !== 2;
+  if (pair.length !== 2) return;
+  const query = new URLSearchParams({ types: pair.map(type).join(","), repetitions: 5 });
+  $("more").href = `record.html?${query}`;
+  say($("more"), `Record five more of ${pair.map(type).join(" and ")}`);
+}
+
+/** Return the true and the recognised type that all these trials have. */
+function pairOf(trials) {
+  return [reply?.truth, reply?.read].map((kinds) => new Set(trials.map((trial) => kinds[trial])))
+    .reduce((pair, kinds) => (pair && kinds.size === 1 ? [...pair, ...[...kinds].filter((kind) => !pair.includes(kind))] : null), []) ?? [];
+}
+
+function showTrials({ trials, typical }) {
+  const first = !$("trials").children.length, cards = trials.map((one) => card(one, typical));
+  const usual = pairOf(selected).map(type).filter((name) => first && typical[name]).map((name) => {
+    const figure = document.createElement("figure"), caption = document.createElement("figcaption");
+    caption.append(...tag(name), ", typically");
+    figure.append(caption, ...hand(typical[name], [], `${name}, typically`));
+    return figure;
+  });
+  $("trials").append(...(cards.length === 1 ? [...cards, ...usual] : [...usual, ...cards]));
+}
+
+function card({ trial, shown, decisive }, typical) {
+  const made = document.createElement("article"), label = document.createElement("label"), box = document.createElement("input");
+  const [truth, read] = [type(reply.truth[trial]), type(reply.read[trial])], verdict = document.createElement("p");
+  Object.assign(box, { type: "checkbox", checked: true, value: trial });
+  box.addEventListener("change", mark);
+  label.append(box, set.trials[trial]);
+  verdict.dataset.is = truth === read ? "good" : "bad";
+  verdict.append(...tag(truth), " recognised as ", ...tag(read));
+  const inputs = document.createElement("ul");
+  list(inputs, decisive.map((sensor) => {
+    const usual = [truth, read].map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");
+    return `${set.sensors[sensor].name} ${percent(shown[sensor])} (${usual})`;
+  }));
+  made.append(label, verdict, ...hand(shown, decisive, set.trials[trial]), ...(decisive.length ? ["Decided by", inputs] : []));
+  return made;
+}
+
+/** Return a picture of what sensors showed: those in use that were closed for more than half of the time, and joints. */
+function hand(shown, decisive, words) {
+  const svg = document.createElementNS(SVG, "svg"), used = new Set(reply.sensors), first = set.sensors.length - set.joints.length;
+  const joints = set.joints.filter(({ joint }) => used.has(first + joint));
+  const switches = drawn.switches.filter(({ bit }) => used.has(bit));
+  if (!switches.length && !joints.length) return [];
+  svg.setAttribute("role", "img");
+  svg.setAttribute("aria-label", `hand: ${words}`);
+  whenSeen(svg, () => {
+    const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
+    const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
+    const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
+    setClosed(shown.map((share) => share > 0.5));
+    setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
+    const names = decisive.map((sensor) => set.sensors[sensor].name);
+    for (const spot of svg.querySelectorAll(".spot")) {
+      spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
+    }
+    svg.setAttribute("aria-label", `hand: ${words}`);
+  });
+  return [svg];
+}
+
+const waiting = new Map();
+const watcher = new IntersectionObserver((entries) => {
+  for (const { target, isIntersecting } of entries) {
+    if (!isIntersecting) continue;
+    watcher.unobserve(target);
+    waiting.get(target)();
+    waiting.delete(target);
+  }
+}, { rootMargin: "300px" });
+
+/** Draw when it is nearly on the screen: before, it has no width, and thousands would take long. */
+function whenSeen(element, draw) {
+  waiting.set(element, draw);
+  watcher.observe(element);
+}
+
+/* ---- What the page is asked for ---- */
+
+function nextError(step) {
+  if (!errors.length) return;
+  const [after, before] = [errors.find((trial) => trial > last), errors.findLast((trial) => trial < last)];
+  last = step > 0 ? (after ?? errors[0]) : (before ?? errors.at(-1));
+  select([last]);
+}
+
+function edit(name) {
+  ask("edit", { name, trials: chosen(), id: set.numbering });
+}
+
+$("of").addEventListener("change", look);
+$("next").addEventListener("click", () => nextError(1));
+$("previous").addEventListener("click", () => nextError(-1));
+$("all-errors").addEventListener("click", () => select(errors));
+$("relabel").addEventListener("click", () => edit($("type").value));
+$("drop").addEventListener("click", () => edit(""));
+$("undo").addEventListener("click", () => ask("undo"));
+$("show-more").addEventListener("click", () => askFor($("trials").querySelectorAll("article").length));
+$("lasso").addEventListener("click", () => {
+  const on = $("lasso").getAttribute("aria-pressed") !== "true";
+  $("lasso").setAttribute("aria-pressed", String(on));
+  map.touch = on;
+});
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select, input:not([type=checkbox])")) return;
+  if (event.key === "n" || event.key === "p") nextError(event.key === "n" ? 1 : -1);
+});

@@ -1,0 +1,188 @@
+// The map of trials: thousands of marks on a canvas, to hover over, click, or draw a line around.
+
+const MARGIN = 14, REACH = 12; // pixels
+const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
+
+export class TrialMap {
+  #canvas;
+  #on;
+  #trials = []; // of each: its place on the map, 0 to 1, and how it looks
+  #labels = [];
+  #selected = new Set();
+  #pointed = -1;
+  #line = null; // the lasso while it is drawn
+  #touch = false;
+
+  /** on: { point(trial or -1), select(trials) } */
+  constructor(canvas, on) {
+    [this.#canvas, this.#on] = [canvas, on];
+    const at = (event) => [event.offsetX, event.offsetY];
+    canvas.addEventListener("pointerdown", (event) => {
+      if (event.button || (event.pointerType === "touch" && !this.#touch)) return;
+      canvas.setPointerCapture(event.pointerId);
+      this.#line = [at(event)];
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (this.#line) {
+        this.#line.push(at(event));
+        this.#draw();
+      } else this.#point(this.#nearest(at(event)));
+    });
+    canvas.addEventListener("pointerup", () => this.#close());
+    canvas.addEventListener("pointercancel", () => {
+      this.#line = null;
+      this.#draw();
+    });
+    canvas.addEventListener("click", (event) => {
+      const trial = this.#nearest(at(event));
+      if (trial >= 0 && !this.#closed) this.#on.select([trial]);
+      this.#closed = false;
+    });
+    canvas.addEventListener("keydown", (event) => this.#press(event));
+    new ResizeObserver(() => this.#draw()).observe(canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
+  }
+
+  #closed = false; // whether the click to come ends a lasso
+
+  /** Let a finger draw the lasso instead of scrolling. */
+  set touch(on) {
+    this.#touch = on;
+    this.#canvas.classList.toggle("lasso", on);
+  }
+
+  /** places: [x, y] of each trial; looks: { colour, wrong } of each; codes: of each type { code, trials } */
+  show(places, looks, codes) {
+    const scaled = [0, 1].map((axis) => {
+      const values = places.map((place) => place[axis]);
+      const [low, high] = values.reduce(([least, most], value) => [Math.min(least, value), Math.max(most, value)], [Infinity, -Infinity]);
+      return values.map((value) => (value - low) / (high - low || 1));
+    });
+    this.#trials = looks.map((look, trial) => ({ ...look, x: scaled[0][trial], y: 1 - scaled[1][trial] }));
+    this.#labels = codes.map(({ code, trials }) => {
+      const mean = (axis) => trials.reduce((sum, trial) => sum + this.#trials[trial][axis], 0) / trials.length;
+      return { code, x: mean("x"), y: mean("y") };
+    });
+    this.#pointed = -1;
+    this.#draw();
+  }
+
+  select(trials) {
+    this.#selected = new Set(trials);
+    this.#draw();
+  }
+
+  #pixels({ x, y }) {
+    const { clientWidth, clientHeight } = this.#canvas;
+    return [MARGIN + x * (clientWidth - 2 * MARGIN), MARGIN + y * (clientHeight - 2 * MARGIN)];
+  }
+
+  #draw() {
+    const canvas = this.#canvas, pen = canvas.getContext("2d"), colours = getComputedStyle(canvas);
+    const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
+    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+    pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    pen.clearRect(0, 0, wide, high);
+    const [text, page, bad, soft] = ["--text", "--page", "--bad", "--soft"].map((name) => colours.getPropertyValue(name));
+    const circle = (x, y, radius) => {
+      pen.beginPath();
+      pen.arc(x, y, radius, 0, 2 * Math.PI);
+    };
+    this.#trials.forEach((trial, number) => {
+      const [x, y] = this.#pixels(trial), chosen = this.#selected.has(number);
+      circle(x, y, 3.5);
+      pen.fillStyle = trial.colour;
+      pen.fill();
+      pen.strokeStyle = soft;
+      pen.lineWidth = 0.5;
+      pen.stroke();
+      if (!trial.wrong && !chosen) return;
+      circle(x, y, chosen ? 8 : 5.5);
+      pen.strokeStyle = chosen ? text : bad;
+      pen.lineWidth = chosen ? 3 : 1.5;
+      pen.stroke();
+    });
+    pen.font = `600 14px ${colours.fontFamily}`;
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    for (const label of this.#labels) {
+      const [x, y] = this.#pixels(label);
+      pen.strokeStyle = page;
+      pen.lineWidth = 4;
+      pen.strokeText(label.code, x, y);
+      pen.fillStyle = text;
+      pen.fillText(label.code, x, y);
+    }
+    pen.strokeStyle = text;
+    if (this.#pointed >= 0) {
+      pen.lineWidth = 2;
+      circle(...this.#pixels(this.#trials[this.#pointed]), 11);
+      pen.stroke();
+    }
+    if (!this.#line) return;
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    for (const place of this.#line) pen.lineTo(...place);
+    pen.stroke();
+  }
+
+  #nearest([x, y]) {
+    let best = -1, least = REACH;
+    this.#trials.forEach((trial, number) => {
+      const [left, top] = this.#pixels(trial), far = Math.hypot(left - x, top - y);
+      if (far < least) [best, least] = [number, far];
+    });
+    return best;
+  }
+
+  #point(trial) {
+    if (trial === this.#pointed) return;
+    this.#pointed = trial;
+    this.#on.point(trial);
+    this.#draw();
+  }
+
+  /** Select what the line goes around, if it is more than a click. */
+  #close() {
+    const line = this.#line ?? [];
+    this.#line = null;
+    this.#closed = line.some(([x, y]) => Math.hypot(x - line[0][0], y - line[0][1]) > REACH / 2);
+    this.#draw();
+    if (!this.#closed) return;
+    const inside = this.#trials.map((trial, number) => (within(line, this.#pixels(trial)) ? number : -1)).filter((number) => number >= 0);
+    if (inside.length) this.#on.select(inside);
+  }
+
+  /** Go to the nearest trial in the direction of an arrow, and select it by Enter. */
+  #press(event) {
+    if (event.key === "Enter" || event.key === " ") {
+      event.preventDefault();
+      if (this.#pointed >= 0) this.#on.select([this.#pointed]);
+    }
+    const ahead = ARROWS[event.key];
+    if (!ahead || !this.#trials.length) return;
+    event.preventDefault();
+    if (this.#pointed < 0) {
+      this.#point(0);
+      return;
+    }
+    const from = this.#pixels(this.#trials[this.#pointed]);
+    let best = -1, least = Infinity;
+    this.#trials.forEach((trial, number) => {
+      const to = this.#pixels(trial), step = [to[0] - from[0], to[1] - from[1]];
+      const along = step[0] * ahead[0] + step[1] * ahead[1], aside = Math.abs(step[0] * ahead[1]) + Math.abs(step[1] * ahead[0]);
+      if (number !== this.#pointed && along > 0 && along + 2 * aside < least) [best, least] = [number, along + 2 * aside];
+    });
+    if (best >= 0) this.#point(best);
+  }
+}
+
+/** Return whether a place is inside a closed line: a ray from it crosses the line an odd number of times. */
+function within(line, [x, y]) {
+  let inside = false;
+  line.forEach(([x1, y1], at) => {
+    const [x2, y2] = line[(at + 1) % line.length];
+    if (y1 > y !== y2 > y && x < x1 + ((y - y1) / (y2 - y1)) * (x2 - x1)) inside = !inside;
+  });
+  return inside;
+}

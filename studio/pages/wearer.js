@@ -1,0 +1,106 @@
+// The page Wearer: a few trials of a person, a build that is adapted to them, and the way back.
+import { openPage } from "./shell.js";
+import { tag, typeStyles } from "./types.js";
+import { cell, list, say } from "./wire.js";
+
+const $ = (id) => document.getElementById(id);
+
+let sets = []; // the wearer's sets, with their boxes
+let state = null; // the message on the wearer and the build
+let begun = false; // whether this page has just begun to record
+let awaited = false; // whether it has just asked to adapt
+
+const ask = openPage({
+  open: () => choose(),
+  wearing: (message) => {
+    const { wearer, why } = message;
+    if (document.activeElement !== $("subject")) $("subject").value = wearer;
+    state = message;
+    $("empty").hidden = !why;
+    say($("empty"), why);
+    $("with-build").hidden = Boolean(why);
+    if (!why) show(message);
+  },
+  chosen: ({ ids, counts, notes, command }) => {
+    if (String(ids) !== String(ticked())) return;
+    const types = Object.entries(counts).map(([type, count]) => `${type} ${count}`);
+    const lacking = state.types.filter((type) => !counts[type]);
+    say($("counts"), `Trials: ${types.join(", ")}${lacking.length ? `; none of ${lacking.join(", ")}, which change as the others do` : ""}`);
+    list($("notes"), notes);
+    say($("adapt-command"), command);
+  },
+  adapted: (result) => {
+    $("result").hidden = false;
+    say($("result-heading"), `Adapted: ${result.folder}, from ${result.total} trials`);
+    say($("before"), result.before);
+    say($("after"), result.after);
+    const [type, count, , after] = result.types[0];
+    say($("worst"), `${type}: ${after} of ${count}`);
+    list($("warnings"), result.warnings);
+    const styles = typeStyles(result.types.map(([name]) => name));
+    const rows = result.types.map(([name, ...counts]) => {
+      const row = document.createElement("tr"), title = cell("th", "");
+      title.append(tag(styles, name));
+      row.append(title, ...counts.map((one) => cell("td", String(one))));
+      return row;
+    });
+    $("types").replaceChildren(...rows);
+    if (awaited) $("result-heading").focus();
+    awaited = false;
+  },
+  collecting: ({ stage, doing }) => {
+    // The page Record leads through the trials, and comes back here.
+    if (begun && stage !== "over" && doing === "wearer") location.href = "record.html";
+  },
+  station: ({ why }) => {
+    if (why) say($("refused"), why);
+  },
+  work: ({ done, total, what, why }) => {
+    say($("work"), why ?? (what === "adapt" && done < total ? "adapting …" : ""));
+  },
+});
+
+function show({ wearer, base, build, types, sets: members, glove, record, undo }) {
+  say($("use"), build === base ? `${build}: that of everybody` : `${build}: adapted from ${base}`);
+  $("undo").hidden = !undo;
+  say($("undo"), `Undo: use ${undo} again`);
+  say($("plan"), glove ? `Two trials of each of ${types.length} types; three if you add one.` : "The project has no glove.toml: connect a glove first.");
+  for (const one of $("record").elements) one.disabled = !glove;
+  say($("record-command"), record);
+  const unticked = new Set(sets.filter(({ box }) => !box.checked).map(({ id }) => id));
+  sets = members.map(({ id, name, size }) => {
+    const label = document.createElement("label"), box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = !unticked.has(id);
+    box.addEventListener("change", choose);
+    label.append(box, `${name}: ${size}`);
+    return { id, box, label };
+  });
+  say($("no-sets"), members.length ? "" : `no set holds only trials of ${wearer}`);
+  $("sets").replaceChildren($("sets").firstElementChild, $("no-sets"), ...sets.map(({ label }) => label));
+  choose();
+}
+
+const ticked = () => sets.filter(({ box }) => box.checked).map(({ id }) => id);
+
+/** Ask what is in the ticked sets. */
+function choose() {
+  const ids = ticked();
+  $("adapt").disabled = !ids.length;
+  for (const id of ["counts", "adapt-command"]) say($(id), "");
+  list($("notes"), []);
+  if (ids.length) ask("chosen", { ids });
+}
+
+$("who").addEventListener("submit", (event) => {
+  event.preventDefault();
+  ask("wearer", { name: $("subject").value });
+});
+$("record").addEventListener("submit", (event) => {
+  event.preventDefault();
+  begun = ask("wear", { name: $("type").value });
+});
+$("adapt").addEventListener("click", () => {
+  awaited = ask("adapt", { ids: ticked() });
+});
+$("undo").addEventListener("click", () => ask("unwear"));
