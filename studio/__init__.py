@@ -4,6 +4,7 @@
 """
 
 from .choose import ChoosePage
+from .live import StudioLive
 from .project import Project
 from .studio import Studio
 
@@ -14,5 +15,6 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     """Return the open studio of a project: see `Studio`."""
     studio = Studio(project, address, token=token, jobs=jobs)
     ChoosePage(studio)
+    StudioLive(studio)
     studio.changed()
     return studio

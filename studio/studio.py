@@ -7,6 +7,7 @@ thread if it takes milliseconds. Longer work is queued and done one at a time, b
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import BrokenExecutor
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -32,7 +33,8 @@ class Asked(msgspec.Struct, frozen=True):
 
     sensors  numbers of sensors        trial  the number of a trial
     id       of a member of the project    name  a name, or a key
-    value    a number
+    value    a number                      ids   of several members
+    numbers  of moments and parts of a recording, as `Replay.reply` takes them
     """
 
     do: str
@@ -41,6 +43,8 @@ class Asked(msgspec.Struct, frozen=True):
     id: str = ""
     name: str = ""
     value: float | None = None
+    ids: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
 
 
 Handler = Callable[[Asked], bytes | None]
@@ -64,6 +68,8 @@ class Studio(Closing):
         The server of the pages; `server.url` is its address.
     station : Station
         What uses the glove.
+    closing : ExitStack
+        What is to be closed with the studio.
 
     Raises
     ------
@@ -79,6 +85,7 @@ class Studio(Closing):
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
         self.server = Server("choose", address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
+        self.closing = ExitStack()
 
     def add(
         self, file: str, title: str, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None
@@ -135,6 +142,7 @@ class Studio(Closing):
         """End what uses the glove, and close the pages."""
         self.station.stop()
         self.server.close()
+        self.closing.close()
 
     def _report(self, what: str, done: int, total: int) -> None:
         self.publish("work", message("work", done=done, total=total, what=what))
