@@ -17,7 +17,10 @@ export class Steer {
     [this.#ids, this.#ask] = [ids, ask];
     section.hidden = false;
     section.append(made("h2", "steer-heading", ids.length ? "Recording" : "Run"));
-    const run = this.#row(section), replay = this.#row(section);
+    const sides = section.appendChild(document.createElement("div"));
+    sides.className = "sides";
+    const [left, right] = [0, 1].map(() => sides.appendChild(document.createElement("div")));
+    const run = this.#row(left), replay = this.#row(right);
     if (ids.length) {
       const back = made("a", "back", "Back to the run");
       back.href = "live.html";
@@ -27,13 +30,13 @@ export class Steer {
       this.#button(run, "run", "Start", () => ask(this.#doing === "live" ? "halt" : "run"));
       this.#parts.doing = made("p", "doing");
       this.#parts.doing.setAttribute("role", "status");
-      section.append(this.#command("run"), this.#parts.doing);
+      left.append(this.#command("run"), this.#parts.doing);
     }
     this.#choice(replay, "recording", "Recording", () => this.#show());
     this.#choice(replay, "first", "Build", () => this.#show());
     this.#choice(replay, "second", "Compare with", () => this.#show());
     this.#button(replay, "open", "Show", () => location.assign(`live.html?${this.#chosen.map((id) => `id=${id}`).join("&")}`));
-    section.append(replay, this.#command("open"));
+    right.append(this.#command("open"));
   }
 
   /** Take the recordings and builds of the project. */
