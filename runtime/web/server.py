@@ -47,6 +47,8 @@ PING_S = 5.0 / 1.5
 _SEND_BUFFER = 65_536
 # A page sends a few words when a user presses a button or holds a key.
 MOST_BYTES, MOST_PER_S, MOST_AT_ONCE = 16_384, 20.0, 40.0
+# Replies that a page has not read, before it loses its place.
+MOST_UNREAD = 4 << 20
 _CLOSING_S = 0.5
 _ANY = {"0.0.0.0", "::"}
 
@@ -256,7 +258,7 @@ class Server(Closing):
 
     async def _listen(self, page: "_Page") -> None:
         async for came in page.socket:
-            if not page.may_speak(self._loop.time()):
+            if not page.may_speak(self._loop.time()) or page.transport.get_write_buffer_size() > MOST_UNREAD:
                 await page.close(WSCloseCode.POLICY_VIOLATION)
                 return
             if came.type is WSMsgType.PING and page.transport.get_write_buffer_size() == 0:
