@@ -454,7 +454,8 @@ def _draw_hand(axes: "Axes", hand: HandShape | None, study: SensorStudy) -> None
     axes.axis("off")
     if len(hand.outline):
         axes.plot(*hand.outline.T, color=on_paper("outline"), linewidth=0.8)
-    axes.scatter(*hand.places.T, s=14, facecolors="none", edgecolors=on_paper("crease"), linewidths=0.7)
+    every = hand.places.T
+    axes.scatter(every[0], every[1], s=14, facecolors="none", edgecolors=on_paper("crease"), linewidths=0.7)
     off, labels = [], []
     for number, row in enumerate(study.chosen, 1):
         if not hand.knows([row.name]):
