@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .integers import COARSE, FINEST_SCALE, IntegerTables
 from .tables import ScoreTables
-from .terms.base import CoreTerm, Floats, rounded
+from .terms.base import Floats, rounded
 from .terms.line import LARGEST_SLOPE, WIDEST, Line
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
@@ -154,11 +154,6 @@ class Extremes:
         return float(np.vstack([groups, others]).max(initial=0.0))
 
 
-def _whole(tables: ScoreTables, scale: float, grid: int) -> list[CoreTerm]:
-    """Return the terms in whole steps."""
-    return [term.whole(scale, grid) for term in _centred(tables, scale).core_terms]
-
-
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
     """Return the bias in whole steps, with compensation for the mean error of rounding switches' rows to a `grid`.
 
@@ -194,7 +189,7 @@ def quantise(
         if grid == 1 or beyond <= 0:
             break
         room += beyond  # the compensation in the bias needs room, too
-    terms = tuple(term.integers() for term in _whole(balanced, scale, grid))
+    terms = tuple(term.whole(scale, grid).integers() for term in _centred(balanced, scale).core_terms)
     s, j, K = tables.n_switches, tables.n_joints, tables.n_classes
     none = np.zeros((s + j, K), np.int16)
     integers = IntegerTables(bias.astype(np.int16), terms, none[:s], none[s:], scale, grid)

@@ -232,7 +232,9 @@ class LiveSegments:
         """
         since_us = now_us - self._last_us
         if self._next_us is not None and not 0 <= since_us <= GRACE_US:
-            self._begin_afresh()
+            self._segments = self.newest.number - (self.newest.state == "forming")
+            self._decoder, self._next_us, self._tick, self._set = Decoder(self._model, self._lag), None, -1, []
+            self._shown, self.newest = None, Segment(number=self._segments)
         if scores is None:
             self._unread = True
             return self.newest
@@ -247,12 +249,6 @@ class LiveSegments:
             self._next_us += self.tick_us
         self._scores = scores, refused
         return self.newest
-
-    def _begin_afresh(self) -> None:
-        newest = self.newest
-        self._segments = newest.number - (newest.state == "forming")
-        self._decoder, self._next_us, self._tick, self._set = Decoder(self._model, self._lag), None, -1, []
-        self._shown, self.newest = None, Segment(number=self._segments)
 
     def _push(self, scores: Sequence[int], refused: bool) -> None:
         found, none = self._decoder.push(scores, refused), self._model.n_types
@@ -271,8 +267,5 @@ class LiveSegments:
         if of == none:
             self.newest = Segment(number=number)
         else:
-            self.newest = Segment(state, number, of, self._grasps[of], self._time_us(start))
-
-    def _time_us(self, tick: int) -> int:
-        first, time_us = next((each for each in reversed(self._set) if each[0] <= tick), self._set[0])
-        return time_us + (tick - first) * self.tick_us
+            first, time_us = next((each for each in reversed(self._set) if each[0] <= start), self._set[0])
+            self.newest = Segment(state, number, of, self._grasps[of], time_us + (start - first) * self.tick_us)
