@@ -141,6 +141,15 @@ def test_the_overview_comes_in_parts_that_join(replay: Callable[..., Replay], mo
     assert len(whole["truth"]) == 5
 
 
+def test_a_recording_of_too_many_changes_says_where_its_timeline_ends(
+    replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_MOST_CHANGES", 2)
+    overview = asked(replay(1, 2, 4, 8, 16, 32), "overview", 0, 0)
+    assert (len(overview["changes"][0]), len(overview["truth"])) == (2, 2)
+    assert overview["faults"] == ["the timeline ends at 2 changes of the prediction, or labels"]
+
+
 HUGE = 2**62
 
 
