@@ -32,7 +32,7 @@ const ask = openPage({
   ...(ids.length ? {} : run),
   replay: (recording) => {
     for (const one of document.querySelectorAll("[data-of]")) one.hidden = one.dataset.of !== "recording";
-    $("beside").hidden = recording.builds.length < 2;
+    $("other").hidden = recording.builds.length < 2;
     begin(recording, false);
     view.setHand(recording.hand);
     replay.begin(recording);

@@ -124,8 +124,8 @@ export class Replay {
     for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
     if (!other) return;
     const second = spanAt(other.announced, at)?.name ?? "nothing", wrong = label !== null && differs(second, label);
-    say($("beside"), `${wrong ? "✗ " : ""}${other.name}: ${second}`);
-    $("beside").classList.toggle("wrong", wrong);
+    say($("other"), `${wrong ? "✗ " : ""}${other.name}: ${second}`);
+    $("other").classList.toggle("wrong", wrong);
   }
 
   // Ask for the moments from the cursor on; one request at a time.

@@ -181,7 +181,7 @@ export class Timeline {
     this.draw();
   }
 
-  /** Return what is known at the cursor, in words. */
+  /** The lanes at the cursor, in words. */
   get reading() {
     if (this.last === null) return this.live ? "no frame yet" : "not read yet";
     const at = this.at ?? this.last, parts = [];

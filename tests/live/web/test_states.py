@@ -270,7 +270,7 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
         ):
             browser.script("location.hash = `t=${arguments[0]}`", seconds)
             texts = (grasp, said, other)
-            browser.wait(lambda texts=texts: tuple(map(browser.text, ("grasp", "truth", "beside"))) == texts)
+            browser.wait(lambda texts=texts: tuple(map(browser.text, ("grasp", "truth", "other"))) == texts)
             wrong = said.startswith("✗")
             sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
             assert ("✗" in browser.script(sign)) == wrong

@@ -179,7 +179,8 @@ def test_what_is_no_span_is_refused_in_a_sentence(replay: Callable[..., Replay],
     for do in ("moments", "overview"):
         with pytest.raises(SettingError, match=f"for the {do} of a recording, a page must send . whole numbers"):
             shown.reply(do, numbers if do == "moments" or numbers != (0, 1) else (0, 1, 2))
-    for wrong in ("delete", "", None, 1, [], "x" * 10**6):
+    others: tuple[object, ...] = ("delete", "", None, 1, [], "x" * 10**6)
+    for wrong in others:
         with pytest.raises(SettingError, match="a page can ask for the overview or for moments") as refusal:
             shown.reply(wrong, (0, 1, 1))
         assert len(str(refusal.value)) < 120
