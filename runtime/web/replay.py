@@ -122,7 +122,9 @@ class Replay(Closing):
             raise SettingError(f"a page can ask for the overview or for moments of a recording, not {str(do)[:20]!r}")
         count = 3 if do == "moments" else len(self._builds) + 1
         if not isinstance(numbers, list | tuple) or len(numbers) != count or not all(map(_is_number, numbers)):
-            raise SettingError(f"for the {do} of a recording, a page must send {count} whole numbers of at most 62 bits")
+            raise SettingError(
+                f"for the {do} of a recording, a page must send {count} whole numbers of at most 62 bits"
+            )
         return self._moments(*numbers) if do == "moments" else self._overview(numbers)
 
     def _overview(self, have: Sequence[int]) -> bytes:
