@@ -59,7 +59,10 @@ const ask = openPage({
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
   },
   trials: (message) => {
-    if (String(message.asked) === String(asked)) showTrials(message);
+    // The same trials may have been asked for twice.
+    if (!asked.length || String(message.asked) !== String(asked)) return;
+    asked = [];
+    showTrials(message);
   },
 });
 
