@@ -200,7 +200,7 @@ def refuse(where: str, *names: str) -> None:
     context = click.get_current_context()
     for option in context.command.params:
         if option.name in names and context.get_parameter_source(option.name) is not ParameterSource.DEFAULT:
-            raise click.UsageError(f"{option.opts[0]} has no effect {where}: leave it out")
+            raise click.UsageError(f"{max(option.opts, key=len)} has no effect {where}: leave it out")
 
 
 add_type_option = click.option(

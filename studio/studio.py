@@ -7,6 +7,7 @@ thread if it takes milliseconds. Longer work is queued and done one at a time, b
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -35,6 +36,7 @@ class Asked(msgspec.Struct, frozen=True):
     sensors  numbers of sensors        trial, trials  numbers of trials
     id       of a member of the project    name, names  a name, or a key; several
     value    a number                      ids   of several members
+    numbers  of moments and parts of a recording, as `Replay.reply` takes them
     """
 
     do: str
@@ -46,6 +48,7 @@ class Asked(msgspec.Struct, frozen=True):
     names: tuple[str, ...] = ()
     value: float | None = None
     ids: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
 
 
 Handler = Callable[[Asked], bytes | None]
@@ -69,6 +72,8 @@ class Studio(Closing):
         The server of the pages; `server.url` is its address.
     station : Station
         What uses the glove.
+    closing : ExitStack
+        What is to be closed with the studio.
 
     Raises
     ------
@@ -88,6 +93,7 @@ class Studio(Closing):
         self._began_s, self._cancelled = 0.0, False
         self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
+        self.closing = ExitStack()
 
     def add(
         self, file: str, title: str, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None
@@ -155,6 +161,7 @@ class Studio(Closing):
         """End what uses the glove, and close the pages."""
         self.station.stop()
         self.server.close()
+        self.closing.close()
 
     def _show_members(self) -> None:
         kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}

@@ -75,6 +75,12 @@ def connect(browser: Browser, board: BoardSender, port: str) -> None:
     browser.wait(lambda: browser.driver.find_element(By.ID, "with-glove").is_displayed())
 
 
+def captured(browser: Browser) -> bool:
+    """Wait for the end of the countdown, and return whether the grasp was captured."""
+    browser.wait(lambda: "captured: " in browser.text("standing"))
+    return browser.text("standing").startswith("captured: ")
+
+
 def record(browser: Browser, board: BoardSender, trials: int, lean: int) -> None:
     """Lead through all trials; a hand differs from others by how far its finger bends."""
     key = "#keys [data-key=accept]"
@@ -84,7 +90,9 @@ def record(browser: Browser, board: BoardSender, trials: int, lean: int) -> None
         browser.wait(lambda number=number: browser.text("place").startswith(f"{number} of {trials}"))  # type: ignore[misc]
         held = HELD[browser.text("prompt").split(" ")[0]]
         board.show(held | {"flex": held["flex"] + lean + 3 * number})
-        browser.wait(lambda: browser.text("standing").startswith("captured: "))
+        while not captured(browser):  # a busy machine lost rows: do it again, as the page says
+            browser.driver.find_element(By.CSS_SELECTOR, key).click()
+            browser.wait(lambda: "captured" not in browser.text("standing"))
         browser.driver.find_element(By.CSS_SELECTOR, key).click()
     browser.wait(lambda: browser.text("prompt") == "no trial is left")
     browser.driver.find_element(By.CSS_SELECTOR, key).click()
