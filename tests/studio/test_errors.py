@@ -278,6 +278,8 @@ def test_an_address_names_a_trial(browser: Browser, studio: Start) -> None:
     assert browser.text("selection-heading").startswith("trial 17 of A, thing: rod")
     assert str(browser.driver.current_url).endswith("errors.html")
     browser.open(f"{opened.server.url}errors.html#%3Cimg%20src%3Dx%3E")
+    browser.driver.refresh()
+    browser.wait(lambda: str(browser.driver.current_url).endswith("errors.html"))
     browser.wait(lambda: "trials misread" in browser.text("about"))
     assert browser.text("selection-heading") == "No trial selected"
 
