@@ -54,7 +54,7 @@ def choose_page(folder: Path) -> Iterator[str]:
     subprocess.run(
         [*thenar, "simulate", "kamakura", "--repetitions", "10", "-o", grasps], check=True, capture_output=True
     )
-    command = [*thenar, "studio", grasps, "--web", "127.0.0.1:0"]
+    command = [*thenar, "studio", str(folder), "--web", "127.0.0.1:0"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None

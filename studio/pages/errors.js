@@ -3,7 +3,7 @@ import { button, interval, storedChoice } from "./choice.js";
 import { drawHand } from "./hand.js";
 import { TrialMap } from "./map.js";
 import { openPage } from "./shell.js";
-import { chip, typeStyles } from "./types.js";
+import { tag, typeStyles } from "./types.js";
 import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -59,7 +59,10 @@ const ask = openPage({
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
   },
   trials: (message) => {
-    if (String(message.asked) === String(asked)) showTrials(message);
+    // The same trials may have been asked for twice.
+    if (!asked.length || String(message.asked) !== String(asked)) return;
+    asked = [];
+    showTrials(message);
   },
 });
 
@@ -97,7 +100,7 @@ function show(message) {
   map.show(reply.places, looks, labels);
   const entries = reply.types.filter((_, kind) => trials[kind].length).map((name) => {
     const entry = document.createElement("li");
-    entry.append(...tag(name));
+    entry.append(tag(styles, name));
     return entry;
   });
   $("legend").replaceChildren(...entries);
@@ -123,7 +126,7 @@ function matrix(trials) {
     made.className = "plain";
     made.disabled = !wrong.length;
     made.setAttribute("aria-label", `${name}: select its ${wrong.length} errors`);
-    made.replaceChildren(...tag(name));
+    made.replaceChildren(tag(styles, name));
     title.append(made);
     row.append(title);
     reply.types.forEach((other, read) => {
@@ -146,16 +149,10 @@ function column(name) {
   const made = cell("th", "");
   made.scope = "col";
   made.title = name;
-  made.append(...tag(name, true));
+  const label = tag(styles, name);
+  label.lastChild.className = "unseen";
+  made.append(label);
   return made;
-}
-
-/** Return the code and the name of a type; the name is not shown where it is the code, or with `short`. */
-function tag(name, short = false) {
-  const style = styles.get(name), whole = document.createElement("span");
-  whole.textContent = name;
-  whole.className = short || style.code === name ? "unseen" : "";
-  return [chip(style), whole.className ? "" : " ", whole];
 }
 
 /* ---- The selected trials ---- */
@@ -212,7 +209,7 @@ function showTrials({ trials, typical }) {
   const first = !$("trials").children.length, cards = trials.map((one) => card(one, typical));
   const usual = pairOf(selected).map(type).filter((name) => first && typical[name]).map((name) => {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption");
-    caption.append(...tag(name), ", typically");
+    caption.append(tag(styles, name), ", typically");
     figure.append(caption, ...hand(typical[name], [], `${name}, typically`));
     return figure;
   });
@@ -226,7 +223,7 @@ function card({ trial, shown, decisive }, typical) {
   box.addEventListener("change", mark);
   label.append(box, set.trials[trial]);
   verdict.dataset.is = truth === read ? "good" : "bad";
-  verdict.append(...tag(truth), " recognised as ", ...tag(read));
+  verdict.append(tag(styles, truth), " recognised as ", tag(styles, read));
   const inputs = document.createElement("ul");
   list(inputs, decisive.map((sensor) => {
     const usual = [truth, read].map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");

@@ -270,6 +270,20 @@ def test_the_sensors_of_choose_are_used_also_after_a_reload(browser: Browser, st
     assert browser.text("rate") == rate
 
 
+def test_an_address_names_a_trial(browser: Browser, studio: Start) -> None:
+    """As the page Compare links to it; a reload does not come back to it."""
+    opened = studio()
+    browser.open(f"{opened.server.url}errors.html#trial%2017%20of%20A%2C%20thing%3A%20rod")
+    cards(browser, 1)
+    assert browser.text("selection-heading").startswith("trial 17 of A, thing: rod")
+    assert str(browser.driver.current_url).endswith("errors.html")
+    browser.open(f"{opened.server.url}errors.html#%3Cimg%20src%3Dx%3E")
+    browser.driver.refresh()
+    browser.wait(lambda: str(browser.driver.current_url).endswith("errors.html"))
+    browser.wait(lambda: "trials misread" in browser.text("about"))
+    assert browser.text("selection-heading") == "No trial selected"
+
+
 @pytest.fixture(scope="module")
 def trained(people: GraspSet, hand: HandShape, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a build of the first three people."""
