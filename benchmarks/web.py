@@ -1,16 +1,21 @@
 """The cost of a page for the run that it shows, with no browser, one, ten, and ten with one that hangs.
 
-    python benchmarks/web.py [--frames N]
+    python benchmarks/web.py [--frames N] [--seconds S]
 
 Each frame comes from memory, 400 per second, to a run without a page and to one with it, so that other load affects
 both. Each case is a line: CPU of the run's thread per frame, and its increase over a run without a page (at most 20
 us); wall time from a frame to its grasp; the load of the server's thread on a core; the frames per second that the
 readers received. Readers are WebSockets in a separate process, on the same cores.
+
+A second table is of the page in Chromium, if it is there, for a glove of 100 frames per second: the time from a frame
+until the page has drawn it (95 % within 60 ms), updates per second, the load of the page's process on a core (at most
+15 %), messages and bytes per second, and the heap when it began and at the end.
 """
 
 import argparse
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import time
@@ -19,6 +24,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -30,6 +36,9 @@ from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
 from thenar.runtime.web.live import LivePage
 from thenar.runtime.web.server import Server
+
+if TYPE_CHECKING:
+    from selenium.webdriver.remote.webdriver import WebDriver
 
 MOST_US, HZ, WARM = 20, 400, 200
 # Says when all are connected; at the end of its input, how many frames each reader got.
@@ -111,9 +120,110 @@ def readers(page: LivePage, number: int, hanging: int, found: list[str]) -> Iter
         found.append(f"{counts[0]:.0f} to {counts[-1]:.0f}")
 
 
+# Counts what the page is sent, and takes the time after it was drawn: in a task behind the page's own drawing.
+WATCH = """
+const Socket = WebSocket;
+window.seen = { ages: [], messages: 0, bytes: 0 };
+window.WebSocket = class extends Socket {
+  constructor(...given) {
+    super(...given);
+    this.addEventListener("message", ({ data }) => {
+      seen.messages++;
+      seen.bytes += data.length;
+      if (!data.startsWith('{"topic":"frame"')) return;
+      const { unix_us } = JSON.parse(data), { port1, port2 } = new MessageChannel();
+      port1.onmessage = () => seen.ages.push(performance.timeOrigin + performance.now() - unix_us / 1000);
+      requestAnimationFrame(() => port2.postMessage(0));
+    });
+  }
+};
+"""
+PAGE_HZ = 100
+
+
+def in_chromium(scene: Played, seconds: float) -> Iterator[tuple[str, ...]]:
+    """Yield the lines of the page in Chromium: of a hand that changes, and of one at rest."""
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000"):
+        options.add_argument(flag)
+    for what, every in (
+        ("a hand that grasps", PAGE_HZ),
+        ("a hand at rest", 0),
+        ("all inputs by chance, in each frame", 1),
+    ):
+        service = webdriver.ChromeService(executable_path=shutil.which("chromedriver"))
+        driver = webdriver.Chrome(options=options, service=service)
+        with ExitStack() as stack:
+            stack.callback(driver.quit)
+            case, page = run_of(scene, scene.folder, what, stack, page=True)
+            assert page is not None
+            driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": WATCH})
+            driver.get(page.server.url)
+            frames = restless(len(scene.kept), round(PAGE_HZ * (seconds + 2)), seed=1)
+            chosen = [frames[number // every * every if every else 0] for number in range(len(frames))]
+            fed(case, chosen[: 2 * PAGE_HZ])
+            # Drivers cannot be called while frames are fed by this thread: what is measured is measured at both ends.
+            driver.execute_script("seen = { ages: [], messages: 0, bytes: 0 }")
+            process = service.process.pid
+            heap, start, busy = heap_of(driver), time.perf_counter(), renderer_s(process)
+            fed(case, chosen[2 * PAGE_HZ :])
+            passed = time.perf_counter() - start
+            share, seen = (renderer_s(process) - busy) / passed, driver.execute_script("return seen")
+            ages = np.percentile(seen["ages"], (50, 95))
+            yield (
+                what,
+                f"{ages[0]:.0f} ms, {ages[1]:.0f} ms",
+                f"{len(seen['ages']) / passed:.0f}",
+                f"{share:.1%}",
+                f"{seen['messages'] / passed:.0f}",
+                f"{seen['bytes'] / passed / 1e3:.0f} kB",
+                f"{heap:.1f} to {heap_of(driver):.1f} MB",
+            )
+
+
+def fed(case: Case, frames: Sequence[tuple[int, bytes]]) -> None:
+    """Send frames at the rate of a usual glove."""
+    due = time.perf_counter()
+    for closed, sensors in frames:
+        due += 1 / PAGE_HZ
+        time.sleep(max(due - time.perf_counter(), 0))
+        case.feed.put(now_us(), closed, sensors)
+        case.step()
+
+
+def heap_of(driver: "WebDriver") -> float:
+    """Return the megabytes that the page's objects take after a collection of garbage."""
+    driver.execute_cdp_cmd("HeapProfiler.collectGarbage", {})
+    driver.execute_cdp_cmd("Performance.enable", {})
+    metrics = driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    return next(metric["value"] for metric in metrics if metric["name"] == "JSHeapUsedSize") / 1e6
+
+
+def renderer_s(driver: int) -> float:
+    """Return the CPU time of the processes that draw the pages of a browser, by the process that started it."""
+    parents, spent = dict[int, int](), dict[int, float]()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            number, fields = int(path.parent.name), path.read_text().rpartition(")")[2].split()
+            parents[number] = int(fields[1])
+            if b"--type=renderer" in (path.parent / "cmdline").read_bytes():
+                spent[number] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        except OSError:  # it ended
+            continue
+
+    def ours(number: int) -> bool:
+        return number == driver or (number in parents and ours(parents[number]))
+
+    return sum(seconds for number, seconds in spent.items() if ours(number))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", type=int, default=4000, help="per case (default 4000)")
+    parser.add_argument("--seconds", type=float, default=20.0, help="per case of the page in Chromium (default 20)")
     options = parser.parse_args()
     console = Console(width=180)
     busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"
@@ -129,9 +239,24 @@ def main() -> None:
             ("ten browsers", 10, 0),
             ("ten, and one that hangs", 10, 1),
         ):
-            for case in compared(scene, Path(name), what, number, hanging, options.frames):
+            for case in compared(scene, Path(name), what, number, hanging, options.frames) if options.frames else ():
                 table.add_row(*case)
-    console.print(table)
+        console.print(table)
+        if shutil.which("chromium") is not None:
+            table = Table(title="The page in Chromium (95 % of frames within 60 ms, at most 15 % of a core)")
+            for title in (
+                "",
+                "frame to page: median, 95 %",
+                "updates/s",
+                "renderer",
+                "messages/s",
+                "per second",
+                "heap",
+            ):
+                table.add_column(title, justify="right" if table.columns else "left")
+            for line in in_chromium(scene, options.seconds):
+                table.add_row(*line)
+            console.print(table)
 
 
 def compared(

@@ -17,8 +17,9 @@ from thenar.drivers.names import shortened
 from thenar.drivers.ports import port_fault
 
 from .consoles import Live, Table
-from .parameters import Number, OutputFile, existing_file, keep_apart, overwrite_flag
+from .parameters import Number, OutputFile, existing_file, keep_apart, overwrite_flag, refuse, web_options
 from .printing import echo, err, table
+from .studio_command import serve_for
 
 if TYPE_CHECKING:
     from thenar.drivers.calibration import GloveCalibration
@@ -40,21 +41,24 @@ def _device(context: click.Context, argument: click.Parameter, text: str) -> str
 
 @click.command("calibrate")
 @click.argument("port", metavar="PORT|glove.toml", callback=_device)
-@click.option("-o", "--output", type=OutputFile(".toml"), required=True, help="The .toml file to write.")
+@click.option("-o", "--output", type=OutputFile(".toml"), help="The .toml file to write.")
 @overwrite_flag
 @click.option("--subject", help="Name of the subject.  [default: the file's name]")
 @click.option("--baud", type=click.IntRange(1, 12_000_000), default=115_200, show_default=True, help="Baud rate.")
 @click.option("--taxels", is_flag=True, is_eager=True, help="Calibrate the taxels of a glove.toml, not a CyberGlove.")
 @click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, if known; with --taxels.")
 @click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Time to hold each pose, seconds.")
+@web_options
 def command(
     port: str,
-    output: Path,
+    output: Path | None,
     subject: str | None,
     baud: int,
     taxels: bool,
     newtons: float | None,
     hold: float,
+    web: str | None,
+    web_token: str | None,
 ) -> None:
     """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for its wearer. Given a glove.toml,
     calibrate its joints, or its taxels with --taxels.
@@ -62,6 +66,8 @@ def command(
     The command asks for a flat hand, a fist and five more poses, shows the sensor values, and takes each pose when you
     press Enter. For taxels, leave all untouched first, then press each one once. The file is written at the end; until
     then, Ctrl-C keeps the old one.
+
+    With --web, the page Glove of `thenar studio` leads through it, and names the file in glove.toml.
 
     \b
     Example:
@@ -73,6 +79,13 @@ def command(
     from thenar.runtime.names import fault
     from thenar.studio.calibrating import lead_poses, lead_presses
 
+    if web is not None:
+        refuse("with --web", "output", "baud", "taxels", "newtons", "hold")
+        serve_for(Path(port), web, web_token, "glove", wearer=subject or "")
+        return
+    refuse("without --web", "web_token")
+    if output is None:
+        raise click.UsageError("name the .toml file to write with --output, or calibrate on a page with --web")
     wearer = subject or output.stem
     if reason := fault(wearer):
         raise click.UsageError(f"subject {shortened(repr(wearer))} {reason}: give another with --subject")

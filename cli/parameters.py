@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from thenar.drivers.names import shortened
 
@@ -192,6 +193,14 @@ def web_options(command: Command) -> Command:
         help=f"Show a page in the browser.  [{WEB_ADDRESS}]",
     )
     return option(web_token_option(command))
+
+
+def refuse(where: str, *names: str) -> None:
+    """Raise UsageError for a given parameter that has no effect `where`."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        if option.name in names and context.get_parameter_source(option.name) is not ParameterSource.DEFAULT:
+            raise click.UsageError(f"{max(option.opts, key=len)} has no effect {where}: leave it out")
 
 
 add_type_option = click.option(

@@ -15,14 +15,31 @@ from .parameters import (
     existing_file,
     existing_folder,
     keep_apart,
+    refuse,
     seed_range,
+    web_options,
 )
 from .printing import echo, progress, warning
+from .studio_command import serve_for
 
 if TYPE_CHECKING:
     from thenar.runtime.build import Build
+    from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.recording.guide import Journal
     from thenar.runtime.recording.session import Collection
+
+
+_ON_PAGE = (
+    "build",
+    "add_type",
+    "taxonomy",
+    "objects",
+    "repetitions",
+    "countdown",
+    "none",
+    "seed",
+    "output",
+)
 
 
 @click.command("record")
@@ -50,9 +67,8 @@ if TYPE_CHECKING:
     help="Also record the empty hand: open, approaching, releasing, moving idly.  [default: none, or as the build]",
 )
 @click.option("--seed", type=seed_range, help="Seed of the trial order.  [default: random]")
-@click.option(
-    "-o", "--output", type=OutputFile(".grasps", goes_on=True), required=True, help="The .grasps file to write."
-)
+@click.option("-o", "--output", type=OutputFile(".grasps", goes_on=True), help="The .grasps file to write.")
+@web_options
 def command(
     glove: Path,
     build: Path | None,
@@ -64,7 +80,9 @@ def command(
     countdown: float,
     none: bool | None,
     seed: int | None,
-    output: Path,
+    output: Path | None,
+    web: str | None,
+    web_token: str | None,
 ) -> None:
     """Record labelled grasps: the command shows which grasp to take, in random order, with a countdown.
 
@@ -74,6 +92,8 @@ def command(
 
     All device data goes into OUTPUT with the ending .mcap. However the collection ends, the same command continues it;
     each time it ends, all trials accepted so far are in OUTPUT.
+
+    With --web the collection is chosen and led on the page Record of `thenar studio`, in the folder of glove.toml.
 
     \b
     Example:
@@ -91,6 +111,13 @@ def command(
     from . import ended_by_signals
     from .collecting import Terminal
 
+    if web is not None:
+        refuse("with --web: choose it on the page", *_ON_PAGE)
+        serve_for(glove, web, web_token, "record", wearer=subject)
+        return
+    refuse("without --web", "web_token")
+    if output is None:
+        raise click.UsageError("name the .grasps file to write with --output, or record on a page with --web")
     recording = output.with_suffix(".mcap")
     keep_apart(glove, objects, output, recording)
     if output.exists() and not recording.exists():
@@ -118,13 +145,18 @@ def command(
         wanted = _resumed(journal, wanted, seed)
     done, total = 0 if journal is None else len(journal.accepted), len(planned(wanted))
     if done < total:
-        if sys.stdin is None:
-            raise click.UsageError("stdin is closed, but a collection is led by keys typed there: run it in a terminal")
-        if any(stream.port == "-" for stream in harness.streams):
-            raise click.UsageError("the keys that lead a collection come from stdin: send rows by udp: instead")
+        _check_keys(harness)
         with ended_by_signals() as stop, Terminal(types, sys.stdin.fileno()) as terminal:
             done = collect(glove, wanted, recording, journal, terminal, stop, countdown)
     _write(recording, output, total, loaded, done)
+
+
+def _check_keys(harness: "Harness") -> None:
+    """Raise UsageError if no keys can come from stdin."""
+    if sys.stdin is None:
+        raise click.UsageError("stdin is closed, but a collection is led by keys typed there: run it in a terminal")
+    if any(stream.port == "-" for stream in harness.streams):
+        raise click.UsageError("the keys that lead a collection come from stdin: send rows by udp: instead")
 
 
 def _check_types(

@@ -12,13 +12,12 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
-from click.core import ParameterSource
 
 from thenar.runtime.names import of_device
 
 from .consoles import Live, Printed, Text, bar, grid
 from .options import LazyOption
-from .parameters import Number, OutputFile, existing_file, existing_folder, overwrite_flag, web_options
+from .parameters import Number, OutputFile, existing_file, existing_folder, overwrite_flag, refuse, web_options
 from .printing import out, say
 from .replaying import replay_recording, replay_set, say_what_was_lost, selecting, spoilt
 
@@ -135,19 +134,12 @@ _POLICY = ("lead", "dwell_ms", "max_lost", "no_quarantine", "lag_ms")
 def _refuse_idle(replay: Path | None) -> None:
     """Raise UsageError for an option that would have no effect."""
     if click.get_current_context().params["web"] is None:
-        _refuse("without --web", "web_token")
+        refuse("without --web", "web_token")
     if replay is not None and replay.suffix == ".mcap":
-        _refuse("for a recording", *_LIVE)
+        refuse("for a recording", *_LIVE)
     elif replay is not None:
         alone = "for a set of grasps, each row of which is classified alone"
-        _refuse(alone, *_LIVE, *_POLICY)
-
-
-def _refuse(where: str, *names: str) -> None:
-    context = click.get_current_context()
-    for option in context.command.params:
-        if option.name in names and context.get_parameter_source(option.name) is not ParameterSource.DEFAULT:
-            raise click.UsageError(f"{option.opts[0]} has no effect {where}: leave it out")
+        refuse(alone, *_LIVE, *_POLICY)
 
 
 def _policy(asked: dict[str, Any]) -> "Policy | None":

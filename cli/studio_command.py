@@ -29,9 +29,24 @@ def command(folder: Path, jobs: int, web: str, web_token: str | None) -> None:
         thenar studio
         thenar studio project/ --jobs 1
     """
+    serve(folder, web, web_token, jobs=jobs)
+
+
+def serve(folder: Path, web: str, web_token: str | None, page: str = "", *, wearer: str = "", jobs: int = -1) -> None:
+    """Serve the studio of a folder until it is ended, with a page first: by default the one that is next to be used."""
     from thenar.studio import Project, open_studio
 
     project = Project(folder, hand_of(None))
-    with suppress(KeyboardInterrupt), open_studio(project, web, token=web_token, jobs=jobs) as studio:
+    if wearer:
+        project.remember(wearer=wearer)
+    first = page or ("choose" if project.sets() else "glove")
+    with suppress(KeyboardInterrupt), open_studio(project, web, token=web_token, jobs=jobs, page=first) as studio:
         say(f"thenar: the page is at {studio.server.url}")
         studio.run(Event())
+
+
+def serve_for(glove: Path, web: str, web_token: str | None, page: str, *, wearer: str = "") -> None:
+    """Serve the studio of the folder of a glove.toml. Raises UsageError for a file that it would not read."""
+    if glove.name != "glove.toml":
+        raise click.UsageError(f"with --web the glove is the glove.toml of a project, not {glove.name}: rename it")
+    serve(glove.parent, web, web_token, page, wearer=wearer)

@@ -62,11 +62,14 @@ _FINEST = 1000
 def exp(x: Floats) -> Floats:
     """Return e^x for x <= 709, any shape; below -746 the result is exactly 0."""
     rest = np.maximum(x, _EXP_UNDERFLOW)
-    power = np.rint(rest * _INVERSE_LN2)
-    rest -= power * _LN2_HIGH
-    rest -= power * _LN2_LOW
-    series = np.full_like(rest, _EXP_TERMS[0])
-    for term in _EXP_TERMS[1:]:
+    power = rest * _INVERSE_LN2
+    np.rint(power, out=power)
+    series = power * _LN2_HIGH
+    rest -= series
+    rest -= np.multiply(power, _LN2_LOW, out=series)
+    np.multiply(rest, _EXP_TERMS[0], out=series)
+    series += _EXP_TERMS[1]
+    for term in _EXP_TERMS[2:]:
         series *= rest
         series += term
     series *= rest

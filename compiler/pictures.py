@@ -7,16 +7,19 @@ file, their templates, the data in their scripts, and the hashes that their poli
 import base64
 import hashlib
 import io
+import re
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import chdir, contextmanager
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
+import numpy as np
 
 from thenar.drivers.extras import missing, optional
 from thenar.runtime.errors import ThenarError
@@ -24,9 +27,22 @@ from thenar.runtime.errors import ThenarError
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
+# Of a drawing that is this wide, letters are of 11 pixels where it is shown 400 pixels wide, as on a phone.
+WIDTH, FONT = 5.6, 11.2  # inches, points
+_SIZE = re.compile(rb'(<svg [^>]*?)width="[^"]*" height="[^"]*" ')
+# Where a label is tried, relative to its place, and how far from it, in points.
+_SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
+_STEPS, _NEAR = (3.0, 7.0, 14.0, 22.0, 32.0, 44.0, 58.0, 74.0), 7.0
+_MARKER = 5.0  # points from the middle of a marker to its edge
+_SHARES = tuple(np.linspace(0.3, 0.9, 7).tolist())
+
+Label = tuple[float, float, str]
+Box = tuple[float, float, float, float]
+
 # The use of each colour, on light and on dark screens; files are light. Switches, joints and both have Okabe and Ito's
 # colours, which the colour-blind can distinguish; baselines have other colours than inputs.
 PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -101,7 +117,67 @@ def rendered(figure: "Figure", kind: str) -> bytes:
         raise PictureError(f"a picture ends in .png or .svg, not in .{kind}")
     file = io.BytesIO()
     figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
-    return file.getvalue()
+    # Without a size of its own, a drawing fills the page or the window that shows it.
+    return _SIZE.sub(rb"\1", file.getvalue(), count=1) if kind == "svg" else file.getvalue()
+
+
+def write_beside(axes: "Axes", labels: Iterable[Label], taken: Iterable[Box], lines: Iterable[Box] = ()) -> None:
+    """Write the text of each label beside its place, where it covers nothing; the first labels have the first choice.
+
+    A text that is far from its place is joined to it by a line. One that finds no room within the axes may cross
+    `lines`, or is left out.
+
+    Parameters
+    ----------
+    axes : Axes
+        The finished axes: later changes of their limits move the places.
+    labels : iterable of (x, y, text)
+        In data coordinates.
+    taken, lines : iterable of (left, bottom, right, top)
+        What must not, and what should not, be covered, such as markers and intervals, in pixels of the figure.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    room, boxes, thin, unit = axes.get_window_extent(renderer).extents, list(taken), list(lines), figure.dpi / 72
+    style: dict[str, Any] = {"ha": "center", "va": "center", "color": on_paper("ink"), "zorder": 6}
+    style["bbox"] = {"facecolor": on_paper("paper"), "edgecolor": "none", "alpha": 0.8, "pad": 0.5}
+    for x, y, words in labels:
+        text = axes.text(0, 0, words)
+        size = text.get_window_extent(renderer)
+        text.remove()
+        place, half = axes.transData.transform((x, y)), (size.width / 2, size.height / 2)
+        found: list[tuple[int, int, list[Box], list[float], bool]] = []
+        for far, side in product(_STEPS, _SIDES):
+            ahead, joined = [one * (reach + far * unit) for one, reach in zip(side, half, strict=True)], far > _NEAR
+            (left, bottom), (right, top) = place + ahead - half, place + ahead + half
+            # Of the line, what lies between marker and text.
+            joint = [tuple((place + share * np.array(ahead)).tolist() * 2) for share in _SHARES if joined]
+            covered = [(left, bottom, right, top), *joint]
+            inside = room[0] < left and room[1] < bottom and right < room[2] and top < room[3]
+            if inside and not any(_meet(one, other) for one in covered for other in boxes):
+                crossed = sum(_meet(one, other) for one in covered for other in thin)
+                found.append((crossed, len(found), covered, ahead, joined))
+        if found:
+            _, _, covered, ahead, joined = min(found)
+            boxes += covered
+            arrow = {"arrowstyle": "-", "color": on_paper("soft"), "lw": 0.6} if joined else None
+            offset = ahead[0] / unit, ahead[1] / unit
+            axes.annotate(words, (x, y), offset, textcoords="offset points", arrowprops=arrow, **style)
+
+
+def around(axes: "Axes", x: float, y: float) -> Box:
+    """Return what the marker at a place in data coordinates takes, in pixels of the figure."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    (right, up), reach = axes.transData.transform((x, y)).tolist(), _MARKER * figure.dpi / 72
+    return right - reach, up - reach, right + reach, up + reach
+
+
+def _meet(one: Box, other: Box) -> bool:
+    return one[0] <= other[2] and other[0] <= one[2] and one[1] <= other[3] and other[1] <= one[3]
 
 
 def templates(package: str, folder: str) -> "Environment":

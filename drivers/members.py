@@ -45,6 +45,8 @@ class Members(Mapping[str, M], Generic[M]):
         The folder's import name.
     group : str
         The group of entry points.
+    base : type, optional
+        What all members, which are classes, derive from.
 
     Raises
     ------
@@ -52,8 +54,8 @@ class Members(Mapping[str, M], Generic[M]):
         On use, if a member of another package cannot be imported, is not a `shape`, or has a name that is taken.
     """
 
-    def __init__(self, kind: str, shape: type[M], package: str, group: str) -> None:
-        self.kind, self.shape, self.package, self.group = kind, shape, package, group
+    def __init__(self, kind: str, shape: type[M], package: str, group: str, base: type | None = None) -> None:
+        self.kind, self.shape, self.package, self.group, self.base = kind, shape, package, group, base
 
     @cached_property
     def _members(self) -> dict[str, M]:
@@ -97,13 +99,13 @@ class Members(Mapping[str, M], Generic[M]):
             what = str(error) if isinstance(error, Exception) else repr(error)
             said = f"cannot be loaded: {shortened(what)}; fix or uninstall it"
             raise SettingError(f"{self._where(point)} {said}") from error
-        if reason := self.unfit(member):
-            raise SettingError(f"{self._where(point)} {reason}: docs/how-to/extend.md says what to define")
+        derives = self.base is None or (isinstance(member, type) and issubclass(member, self.base))
+        fits = isinstance(member, self.shape) and derives
+        if not fits:
+            wanted = f"a {self.shape.__name__}" if self.base is None else f"a class derived from {self.base.__name__}"
+            said = f"is not {wanted}: docs/how-to/extend.md says what to define"
+            raise SettingError(f"{self._where(point)} {said}")
         return member
-
-    def unfit(self, member: object) -> str:
-        """Return why something is no member; "" if it is one."""
-        return "" if isinstance(member, self.shape) else f"is not a {self.shape.__name__}"
 
     def __getitem__(self, name: str) -> M:
         return self._members[name]

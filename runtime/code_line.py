@@ -5,7 +5,6 @@ codes gets the even one. The codes of the two points are rounded once, to 2^-24 
 """
 
 from math import isfinite
-from typing import NamedTuple
 
 from msgspec import Struct
 
@@ -20,32 +19,26 @@ FARTHEST = 65535
 FRACTION, _WHOLE = 24, 20
 
 
-class Point(NamedTuple):
-    """A reading and its code, in 2^-24 of a code."""
-
-    reading: int
-    code: int
-
-
 class CodeLine(Struct, frozen=True):
-    """The line through two points; codes are clipped to 0 to `HIGHEST_CODE`.
+    """The line through two points, each a reading and its code in 2^-24 of a code; codes are clipped to 0 to
+    `HIGHEST_CODE`.
 
     Raises ValueError if the two have the same reading, or are further apart than the C can hold.
     """
 
-    a: Point
-    b: Point
+    a: tuple[int, int]
+    b: tuple[int, int]
 
     def __post_init__(self) -> None:
-        farthest = max(abs(self.a.reading), abs(self.b.reading), abs(self.b.reading - self.a.reading))
-        if self.a.reading == self.b.reading or farthest > FARTHEST:
-            raise ValueError(f"readings {self.a.reading} and {self.b.reading} make no line")
-        if max(abs(self.a.code), abs(self.b.code)) >= 1 << FRACTION + _WHOLE:
+        (one, low), (other, high) = self.a, self.b
+        if one == other or max(abs(one), abs(other), abs(other - one)) > FARTHEST:
+            raise ValueError(f"readings {one} and {other} make no line")
+        if max(abs(low), abs(high)) >= 1 << FRACTION + _WHOLE:
             raise ValueError(f"codes beyond 2^{_WHOLE} make no line")
 
     def code(self, reading: int) -> int:
         """Return the code of a reading."""
-        (first, low), (last, high) = (self.a, self.b) if self.a.reading < self.b.reading else (self.b, self.a)
+        (first, low), (last, high) = sorted((self.a, self.b))
         span, above = last - first, min(max(reading, -FARTHEST), FARTHEST) - first
         whole, rest = divmod(low * span + (high - low) * above + (span << FRACTION - 1), span << FRACTION)
         nearest = whole - (whole & 1) if rest == 0 else whole
@@ -74,4 +67,4 @@ def code_point(coded: Calibration, value: float) -> int:
 
 def code_line(coded: Calibration, a: tuple[int, float], b: tuple[int, float]) -> CodeLine:
     """Return the line through two readings and their values, in the unit of the build. Raises SettingError."""
-    return CodeLine(Point(a[0], code_point(coded, a[1])), Point(b[0], code_point(coded, b[1])))
+    return CodeLine((a[0], code_point(coded, a[1])), (b[0], code_point(coded, b[1])))

@@ -2,9 +2,7 @@
 
 import errno
 import os
-import re
 import stat
-from contextlib import suppress
 from typing import TYPE_CHECKING, BinaryIO
 
 from .errors import ThenarError
@@ -18,70 +16,30 @@ _PIECE = 1 << 20
 def write_atomically(path: "Path", data: bytes, mode: int = 0o666) -> None:
     """Write `data` to `path`: temporary file in the same folder, fsync, rename, fsync of the folder.
 
-    A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there, and
-    the next writer deletes what a killed one left behind. The file's mode is `mode` without the bits of the umask.
-    Raises OSError as the operating system gives it, with `path` as its file; also if `path` is a device or a pipe,
-    which a rename would replace.
+    A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there
+    (after a kill beside the temporary one). The file's mode is `mode` without the bits of the umask. Raises OSError as
+    the operating system gives it, with `path` as its file; also if `path` is a device or a pipe, which a rename would
+    replace.
     """
     if is_special(path):
         raise OSError(errno.EINVAL, "is a device or a pipe, not a file that could be replaced", str(path))
+    temporary = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
     try:
-        _write_beside_and_rename(path, data, mode)
+        # The system subtracts the umask.
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+        try:
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+                temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        sync_folder(path.parent)
     except OSError as reason:
         # The user does not know the temporary file.
         raise OSError(reason.errno, reason.strerror, str(path)) from reason
-
-
-def _write_beside_and_rename(path: "Path", data: bytes, mode: int) -> None:
-    _sweep(path)
-    temporary, descriptor = _new_part(path, mode)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-            temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    sync_folder(path.parent)
-
-
-def _new_part(path: "Path", mode: int) -> "tuple[Path, int]":
-    """Return a new temporary file next to `path`, and its descriptor, which locks it while it is open."""
-    while True:
-        part = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
-        # The system subtracts the umask.
-        descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
-        _lock(descriptor)
-        if os.fstat(descriptor).st_nlink:
-            return part, descriptor
-        os.close(descriptor)  # a concurrent sweep was faster than the lock
-
-
-def _sweep(path: "Path") -> None:
-    """Delete the temporary files that killed writers of `path` left next to it: nobody has locked them."""
-    name = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{8}}\.part")
-    for part in path.parent.iterdir():
-        if name.fullmatch(part.name) and part.is_file() and not part.is_symlink():
-            with suppress(OSError):
-                descriptor = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
-                try:
-                    if _lock(descriptor):
-                        part.unlink()
-                finally:
-                    os.close(descriptor)
-
-
-def _lock(descriptor: int) -> bool:
-    """Lock a file until its descriptor is closed; return whether that was possible."""
-    import fcntl  # there is none on Windows, where this module can still be imported
-
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
 
 
 def is_special(path: "Path") -> bool:

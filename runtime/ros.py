@@ -1,12 +1,20 @@
 """ROS 2: names, messages of grasps, and what its two kinds of node do: of rclpy, and of Cyclone DDS.
 
-A node writes and reads on this machine only, unless it is public. Both kinds have the same topics and types.
+A node writes and reads on this machine only, unless it is public. Both kinds have the same topics and types, and the
+same methods, which raise DeviceError for what fails:
+
+    kind    the type of messages such as std_msgs/String; its fields are keywords of its constructor
+    writer  a function that writes a message to a topic: reliably, with the last 10 kept, and volatile unless the newest
+            is `kept` for late readers (transient local)
+    reader  a function that waits at most some seconds for messages of a topic, from reliable and best-effort writers,
+            and returns them with who sent each, as far as that is known
+    close   ends the node; may be called twice
+
 `thenar_msgs` is a package of ROS next to this file: who uses rclpy, or listens with ROS's tools, has to build it.
 """
 
 import os
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from pathlib import Path
 from typing import Any
@@ -22,30 +30,6 @@ _MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
 _MAX_LENGTH = 200
 Kind = Callable[[str], Any]
 Read = Callable[[float], list[tuple[Any, Hashable]]]
-
-
-class Node(ABC):
-    """A node of ROS. Its constructor and methods raise DeviceError for what fails."""
-
-    @abstractmethod
-    def kind(self, name: str) -> Any:
-        """Return the type of the messages std_msgs/String; its fields are keywords of its constructor."""
-
-    @abstractmethod
-    def writer(self, topic: str, kind: str, *, kept: bool = False) -> Callable[[Any], object]:
-        """Return a function that writes a message to a topic: reliably, with the last 10 kept, and volatile unless the
-        newest is `kept` for late readers (transient local).
-        """
-
-    @abstractmethod
-    def reader(self, topic: str, kind: str) -> Read:
-        """Return a function that waits at most some seconds for messages of a topic, from reliable and best-effort
-        writers, and returns them with who sent each, as far as that is known.
-        """
-
-    @abstractmethod
-    def close(self) -> None:
-        """End the node; may be called twice."""
 
 
 def namespace(name: str) -> str:

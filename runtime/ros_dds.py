@@ -15,7 +15,7 @@ from typing import Any
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.extras import optional
 
-from .ros import DEPTH, PACKAGE, READ_DEPTH, Node, Read
+from .ros import DEPTH, PACKAGE, READ_DEPTH, Read
 
 with optional():
     from cyclonedds.core import DDSException, ReadCondition, WaitSet
@@ -128,7 +128,7 @@ def _sockets() -> dict[int, str]:
     return found
 
 
-class DdsNode(Node):
+class DdsNode:
     """A participant in the domain of ROS's nodes.
 
     CYCLONEDDS_URI selects the network if it is set. Otherwise it is loopback only, unless `public`.

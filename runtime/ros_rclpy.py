@@ -7,10 +7,10 @@ from typing import Any
 
 from thenar.drivers.errors import DeviceError, SettingError
 
-from .ros import DEPTH, PACKAGE, READ_DEPTH, Node, Read
+from .ros import DEPTH, PACKAGE, READ_DEPTH, Read
 
 
-class RclpyNode(Node):
+class RclpyNode:
     """The node "thenar" of a separate context, in ROS's domain `number`. It does not know who sent a message."""
 
     def __init__(self, number: int, *, public: bool) -> None:

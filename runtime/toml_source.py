@@ -13,7 +13,6 @@ from msgspec import Struct, field
 from .errors import ThenarError
 from .files import read_file
 from .names import shortened
-from .nesting import check_toml
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -22,6 +21,17 @@ if TYPE_CHECKING:
 LARGEST = 1_000_000
 # Characters of an error's reason, which may quote the file.
 _LONGEST_REASON = 400
+
+# Nested lists and tables, and parts of a dotted key: the parser recurses at every level, and its time grows with both.
+_DEEPEST = 10
+# Digits of a number: one fewer than the pattern looks for.
+_LONGEST_NUMBER = 1000
+# Every quantifier is possessive: an unclosed text is scanned once, not tried again from every quote in it.
+_MARKS = re.compile(
+    r"""\#[^\n]*+|\"\"\"(?:[^"\\]++|\\.|"(?!""))*+(?:\"\"\")?+|'''(?:[^']++|'(?!''))*+(?:''')?+
+    |"(?:[^"\\\n]++|\\.)*+"?+|'[^'\n]*+'?+|(?P<mark>[][{}=,.\n])|(?P<long>(?<![\w+-])[\w+-]{1001})""",
+    re.VERBOSE | re.DOTALL,
+)
 
 # A place in a file: keys, and list indices from 0.
 Place = tuple[str | int, ...]
@@ -45,7 +55,7 @@ class TomlText(Struct, frozen=True):
         if len(self.text) > LARGEST:
             raise self.raises(f"{self.name} is longer than {LARGEST} characters, the limit for TOML: shorten it")
         try:
-            check_toml(self.text)
+            _check_nesting(self.text)
             return tomllib.loads(self.text)
         except ValueError as reason:
             raise self.raises(f"{self.name} is not valid TOML: {shortened(str(reason), _LONGEST_REASON)}") from reason
@@ -73,6 +83,22 @@ def read_source(file: "Traversable", raises: type[ThenarError]) -> TomlText:
         raise raises(f"{file.name}, line {before + 1}: the text is not UTF-8: save it as UTF-8") from reason
     except OSError as reason:
         raise raises(f"{file}: cannot be read: {reason.strerror}") from reason
+
+
+def _check_nesting(text: str) -> None:
+    """Raise ValueError for what would take the parser minutes: deep nesting, or a long number."""
+    depth = dots = 0
+    for found in _MARKS.finditer(text):
+        mark = found["mark"]
+        if mark == ".":
+            dots += 1
+        elif mark is not None:
+            dots = 0
+            depth += (mark in "[{") - (mark in "]}")
+        elif found["long"] is not None:
+            raise ValueError(f"a key or a number is longer than {_LONGEST_NUMBER} digits")
+        if depth > _DEEPEST or dots > _DEEPEST:
+            raise ValueError(f"lists, tables or dotted keys nest deeper than {_DEEPEST} levels")
 
 
 def spelled(place: Place) -> str:

@@ -45,7 +45,7 @@ class ChoosePage:
         self._studio, self._project = studio, studio.project
         self._quick: QuickAccuracy | None = None
         # The trials as they were recorded, by their numbers on pages, and what pages call this numbering.
-        self.trials, self.numbering = list[TrialId](), ""
+        self.numbered: tuple[list[TrialId], str] = ([], "")
         requests: dict[str, Handler] = {
             "choose": lambda asked: self._reply(asked.sensors),
             "add": lambda asked: self._found("add", asked.sensors),
@@ -56,20 +56,21 @@ class ChoosePage:
         studio.add("choose.html", "Choose", requests, self.read)
 
     def read(self, report: Report) -> None:
-        """Read the project's recordings, and show them. Raises ThenarError if there are none, or a single type."""
-        self._quick = None
+        """Read the project's recordings, and show them; until then pages get those before."""
         try:
             grasp_set, trials, unused = self._project.recordings()
             self._hand = self._project.hand().fitted(grasp_set.element_names)
             self._parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
             quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
+            self._quick = None
             self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
             return
         self._set, self._quick = grasp_set, quick
         of_rows = [trial for trial, none in zip(trials, grasp_set.is_none.tolist(), strict=True) if not none]
-        self.trials = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
-        self.numbering = hashlib.sha256(msgspec.json.encode(self.trials)).hexdigest()[:12]
+        ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
+        said = msgspec.json.encode((ids, grasp_set.fingerprint()))
+        self.numbered = ids, hashlib.sha256(said).hexdigest()[:12]
         self._prices = {name: part.price for name, part in self._parts.items()}
         self._levels = self._levels_of()
         kinds = ["switch"] * len(grasp_set.switch_names) + ["pad"] * len(grasp_set.taxel_columns)
@@ -81,8 +82,8 @@ class ChoosePage:
             "grasps": quick.grasps,
             "types": self.types,
             "joints": _joints(quick.held),
-            "trials": _names(self.trials),
-            "numbering": self.numbering,
+            "trials": _names(ids),
+            "numbering": self.numbered[1],
             "sensors": [
                 {"name": name, "kind": kind, "price": self._prices.get(name)}
                 for name, kind in zip(quick.names, kinds, strict=True)
@@ -94,7 +95,7 @@ class ChoosePage:
     @property
     def _files(self) -> list[str]:
         """The names of the sets that are used."""
-        return list(dict.fromkeys(file for file, *_ in self.trials))
+        return list(dict.fromkeys(file for file, *_ in self.numbered[0]))
 
     @property
     def types(self) -> tuple[str, ...]:

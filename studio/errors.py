@@ -132,7 +132,7 @@ class ErrorsPage:
             about = {"types": quick.grasps, "read": found.read, "mean": found.mean, "low": found.low}
             about |= {"high": found.high, "of": f"{found.of}; quick: not nested"}
         places = quick.places(sensors).tolist()
-        about |= {"truth": quick.truth.tolist(), "places": places, "numbering": self._choose.numbering}
+        about |= {"truth": quick.truth.tolist(), "places": places, "numbering": self._choose.numbered[1]}
         return message("errors", about, sensors=sensors, asked=(asked.name, asked.sensors))
 
     def _trials(self, asked: Asked) -> bytes:
@@ -159,13 +159,14 @@ class ErrorsPage:
         if asked.do == "undo":
             undo(log)
         else:
-            if asked.id != self._choose.numbering:
+            trials, numbering = self._choose.numbered
+            if asked.id != numbering:
                 raise ThenarError("the recordings have changed: look at these trials again")
-            for trial in asked.trials:
-                self._choose.known.rows_of(trial)
+            if not all(0 <= trial < len(trials) for trial in asked.trials):
+                raise ThenarError(f"there are {len(trials)} trials, numbered from 0")
             if asked.name not in ("", *self._choose.types):
                 raise ThenarError(f"{shortened(repr(asked.name))} is not a grasp type of these recordings")
-            change(log, [self._choose.trials[trial] for trial in asked.trials], asked.name)
+            change(log, [trials[trial] for trial in asked.trials], asked.name)
         self._tell_edits()
         self._studio.changed()
 
@@ -174,4 +175,4 @@ class ErrorsPage:
         last = last_action(load_edits(self._project.edits)[0])
         what = counted(len(last), "trial") if len(last) > 1 else named(last[0].of) if last else ""
         done = f"{what} {f'made {last[0].new}' if last[0].new else 'left out'}" if last else ""
-        self._studio.publish("edits", message("edits", last=done))
+        self._studio.publish("edits", message("edits", words=done))

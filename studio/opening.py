@@ -5,6 +5,7 @@ from .collector import Collector
 from .compare import add_compare_page
 from .errors import ErrorsPage
 from .glove import GlovePage
+from .live import StudioLive
 from .project import Project
 from .record import RecordPage
 from .studio import Studio
@@ -18,6 +19,7 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     GlovePage(studio)
     RecordPage(studio, collector)
     ErrorsPage(studio, ChoosePage(studio))
+    StudioLive(studio)
     WearerPage(studio, collector)
     add_compare_page(studio)
     studio.changed()

@@ -1,13 +1,16 @@
 """The page *Record*: guided collections into the project, begun, continued, and imported when they end."""
 
+import json
 import secrets
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from thenar.compiler.recordings import check_names
 from thenar.compiler.recordings.mcap_recording import import_recordings
-from thenar.compiler.recordings.taxonomy import collected
+from thenar.compiler.recordings.taxonomy import ANY, collected
 from thenar.drivers.errors import SettingError, ThenarError
+from thenar.runtime.files import write_atomically
 from thenar.runtime.recording.guide import Journal, planned, read_journal
 from thenar.runtime.recording.session import Collection
 from thenar.runtime.web.server import message
@@ -43,7 +46,7 @@ class RecordPage:
             message(
                 "recordings",
                 unfinished=found,
-                taxonomies=["kamakura14", "cutkosky16", "feix33"] + ["own"] * (objects is not None),
+                taxonomies=["kamakura14", "cutkosky16", "feix33", "own"],
                 objects=objects is not None,
                 glove=self._project.harness.exists(),
             ),
@@ -68,16 +71,18 @@ class RecordPage:
         return self._known[key]
 
     def _begin(self, asked: Asked) -> None:
-        """Begin a collection: `name` is the subject, `id` the taxonomy, `value` the repetitions; trial: with none."""
+        """Begin a collection: `name` is the subject, `id` the taxonomy, `value` the repetitions, `names`
+        own types that no objects.toml lists yet; trial: with none.
+        """
         repetitions = asked.value or 0
         if not (1 <= repetitions <= _MOST_REPETITIONS and repetitions == int(repetitions)):
             raise SettingError(
                 f"{repetitions:g} trials of each type: type a whole number from 1 to {_MOST_REPETITIONS}"
             )
         check_names("subject", [asked.name])
-        if asked.id == "own" and self._objects is None:
-            raise SettingError("the project has no objects.toml, which lists your own types and their objects")
         self._check_glove()
+        if asked.id == "own" and self._objects is None:
+            self._write_types(asked.names)
         types, tasks = collected(asked.id, self._objects, bool(asked.trial))
         collection = Collection(asked.name, types.name, types.types, tasks, int(repetitions), secrets.randbits(32))
         planned(collection)
@@ -86,6 +91,14 @@ class RecordPage:
             self._project.remember(wearer=asked.name)
             self._studio.changed()
         self._start(recording, collection, None)
+
+    def _write_types(self, names: Sequence[str]) -> None:
+        """Write the wearer's own types to objects.toml, each with any object."""
+        check_names("grasp type", names)
+        if len(names) < 2:
+            raise SettingError("name two grasp types at least, with commas between them: fist, pinch, point")
+        lines = "".join(f"{json.dumps(name, ensure_ascii=False)} = [{json.dumps(ANY)}]\n" for name in names)
+        write_atomically(self._project.folder / "objects.toml", lines.encode())
 
     def _continue(self, asked: Asked) -> None:
         path = self._project.path("recording", asked.id)

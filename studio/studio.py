@@ -7,6 +7,7 @@ thread if it takes milliseconds. Longer work is queued and done one at a time, b
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -33,8 +34,9 @@ class Asked(msgspec.Struct, frozen=True):
     """What a page asks for: `do`, and the values that this takes.
 
     sensors  numbers of sensors        trial, trials  numbers of trials
-    id       of a member of the project    name  a name, or a key
+    id       of a member of the project    name, names  a name, or a key; several
     value    a number                      ids   of several members
+    numbers  of moments and parts of a recording, as `Replay.reply` takes them
     """
 
     do: str
@@ -43,8 +45,10 @@ class Asked(msgspec.Struct, frozen=True):
     trials: tuple[int, ...] = ()
     id: str = ""
     name: str = ""
+    names: tuple[str, ...] = ()
     value: float | None = None
     ids: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
 
 
 Handler = Callable[[Asked], bytes | None]
@@ -68,6 +72,8 @@ class Studio(Closing):
         The server of the pages; `server.url` is its address.
     station : Station
         What uses the glove.
+    closing : ExitStack
+        What is to be closed with the studio.
 
     Raises
     ------
@@ -87,6 +93,7 @@ class Studio(Closing):
         self._began_s, self._cancelled = 0.0, False
         self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
         self.station = Station(self.server.publish)
+        self.closing = ExitStack()
 
     def add(
         self, file: str, title: str, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None
@@ -118,8 +125,7 @@ class Studio(Closing):
         about = () if built is None else (built[0], built[1].manifest)
         state = self.project.state
         self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
-        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
-        self.publish("project", message("project", kinds, state=state))
+        self._show_members()
         # Of several changes the last is read: a recording or a build may come while another is read.
         if not self._stale:
             self._stale = True
@@ -146,6 +152,7 @@ class Studio(Closing):
                 if what != "reading":
                     took = round(monotonic() - self._began_s, 1)
                     self.project.remember(took=self.project.state.took | {what: took})
+                    self._show_members()
             except (ThenarError, OSError, BrokenExecutor) as reason:
                 # Parameters are named between backticks, for commands to spell.
                 self.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
@@ -154,6 +161,11 @@ class Studio(Closing):
         """End what uses the glove, and close the pages."""
         self.station.stop()
         self.server.close()
+        self.closing.close()
+
+    def _show_members(self) -> None:
+        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
+        self.publish("project", message("project", kinds, state=self.project.state))
 
     def _report(self, what: str, done: int, total: int) -> None:
         """Tell how far the work is, and how long it takes still: as its parts so far, or as the last time, if known.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from thenar.compiler.firmware.sensors import CodeGrid, Sensor
 from thenar.drivers.calibration import GloveCalibration
-from thenar.runtime.code_line import CodeLine, Point
+from thenar.runtime.code_line import CodeLine
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Recognised, Switch
@@ -41,7 +41,7 @@ def grid_code(grid: CodeGrid, reading: int) -> int:
 def code_of(sensor: Sensor, reading: int) -> int:
     """Return the code of a known sensor's reading."""
     assert sensor.readings is not None
-    first, second = map(Point, sensor.readings, sensor.codes)
+    first, second = zip(sensor.readings, sensor.codes, strict=True)
     return CodeLine(first, second).code(reading if sensor.grid is None else grid_code(sensor.grid, reading))
 
 

@@ -10,7 +10,7 @@ a line or a grid; and the header {"kinds"}, the kinds of the further terms, if t
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
@@ -48,10 +48,6 @@ class _StumpsHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)]
 
 
-class _TermsHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    kinds: tuple[str, ...] = ()
-
-
 def ensemble_to_bytes(model: Model) -> bytes:
     """Return the content of `ensemble.bin`; the same model gives the same bytes."""
     arrays: dict[str, AnyArray]
@@ -59,7 +55,8 @@ def ensemble_to_bytes(model: Model) -> bytes:
         version, header = STUMPS, msgspec.json.encode(_StumpsHeader(model.n_inputs, model.shrinkage))
         arrays = {"columns": model.columns, "thresholds": model.thresholds, "values": model.values}
     else:
-        version, header = TABLES, msgspec.json.encode(_TermsHeader(tuple(term.name for term in model.further)))
+        kinds = [term.name for term in model.further]
+        version, header = TABLES, msgspec.json.encode({"kinds": kinds} if kinds else {})
         arrays = {
             "bias": model.bias,
             "switch_rows": model.switch_rows,
@@ -87,7 +84,7 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
     try:
         if version == STUMPS:
             return _stumps(msgspec.json.decode(header_bytes, type=_StumpsHeader), arrays, what)
-        kinds = msgspec.json.decode(header_bytes, type=_TermsHeader).kinds
+        kinds = msgspec.json.decode(header_bytes, type=dict[Literal["kinds"], tuple[str, ...]]).get("kinds", ())
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
         raise BuildError(f"{what} is damaged: {wrong}") from None
     return _tables(arrays, kinds, what)

@@ -5,6 +5,7 @@ that all rows choose. How often each of them is chosen in the folds, where peopl
 sure the choice is; its stand-in is the sensor that does nearly as well in its place.
 """
 
+import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
 from statistics import fmean
@@ -24,7 +25,7 @@ from ..evaluation.folds import EvaluationError, Fold, Rows
 from ..evaluation.rates import Rate, RecipeWords, student
 from ..hand import HandShape
 from ..model.collapse import collapse
-from ..pictures import on_paper, painting, rendered
+from ..pictures import FONT, WIDTH, around, on_paper, painting, rendered, write_beside
 from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of
 from ..placement.methods.base import METHODS, PAPERS, by_sensors
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 
 # Fits this model by default: it takes a tenth of the time of comparing trainers, and needs no setting.
 TRAINER = "linear"
+_LETTERS = 60  # of a line on the picture
 OWN = 2  # trials of each type, after which the accuracy is measured again
 # The next two sensors together are worth less than this where more of them stop to matter.
 MATTERS = 0.01
@@ -415,11 +417,15 @@ def draw_curve(study: SensorStudy, hand: HandShape | None, kind: str) -> bytes:
 
     Raises PictureError for another kind, or without matplotlib.
     """
-    with painting(9):
+    with painting(FONT):
         from matplotlib.figure import Figure
+        from matplotlib.ticker import MaxNLocator
 
-        figure = Figure(figsize=(11 if hand else 6.5, 4.5), layout="constrained", dpi=120, facecolor=on_paper("paper"))
-        axes, *others = figure.subplots(1, 2 if hand else 1, squeeze=False)[0]
+        figure = Figure(
+            figsize=(WIDTH, 10 if hand else 4.5), layout="constrained", dpi=120, facecolor=on_paper("paper")
+        )
+        ratios = [3, 4] if hand else [1]
+        axes, *others = figure.subplots(len(ratios), squeeze=False, height_ratios=ratios)[:, 0]
         numbers = [point.number for point in study.points]
         means = [100 * point.mean for point in study.points]
         reach = [[100 * (p.mean - p.low) for p in study.points], [100 * (p.high - p.mean) for p in study.points]]
@@ -434,8 +440,9 @@ def draw_curve(study: SensorStudy, hand: HandShape | None, kind: str) -> bytes:
             if len(shown) == len(numbers):
                 axes.plot(numbers, shown, marker=".", linestyle="--", color=on_paper(colour), label=label)
         axes.axvline(study.enough, color=on_paper("line"), zorder=0)
-        axes.set(xlabel=f"sensors kept of {study.there}", ylabel="accuracy, %", xticks=numbers, ylim=(0, 100))
-        axes.legend(loc="lower right", frameon=False)
+        axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+        axes.set(xlabel=f"sensors kept of {study.there}", ylabel="accuracy, %", ylim=(0, 100))
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False)  # above, where no interval is
         for panel in others:
             _draw_hand(panel, hand, study)
         return rendered(figure, kind)
@@ -447,16 +454,19 @@ def _draw_hand(axes: "Axes", hand: HandShape | None, study: SensorStudy) -> None
     axes.axis("off")
     if len(hand.outline):
         axes.plot(*hand.outline.T, color=on_paper("outline"), linewidth=0.8)
-    x, y = hand.places.T
-    axes.scatter(x, y, s=14, facecolors="none", edgecolors=on_paper("crease"), linewidths=0.7)
-    off = []
+    every = hand.places.T
+    axes.scatter(every[0], every[1], s=14, facecolors="none", edgecolors=on_paper("crease"), linewidths=0.7)
+    off, labels = [], []
     for number, row in enumerate(study.chosen, 1):
         if not hand.knows([row.name]):
             off.append(f"{number} {row.name}")
             continue
         ((x, y),) = hand.places[hand.numbers_of([row.name])].tolist()
-        size = 60 + 160 * row.folds / study.folds
-        axes.scatter(x, y, s=size, color=on_paper("kept"), zorder=2)
-        axes.text(x, y, str(number), ha="center", va="center_baseline", color=on_paper("on-kept"), fontsize=7)
+        axes.scatter(x, y, s=30 + 60 * row.folds / study.folds, color=on_paper("kept"), zorder=2)
+        labels.append((x, y, str(number)))
     if off:
-        axes.set_title("joints: " + ", ".join(off), fontsize=8, wrap=True)
+        axes.set_title(textwrap.fill("joints: " + ", ".join(off), _LETTERS), fontsize=FONT)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()  # which settles where the axes are
+    write_beside(axes, labels, [around(axes, x, y) for x, y, _ in labels])

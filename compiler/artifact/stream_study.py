@@ -20,7 +20,6 @@ from thenar.runtime.live.decision import Decision, Ranking
 from thenar.runtime.policy import Policy
 from thenar.runtime.recipe import Inputs, Recipe
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.segmenting.decoder import decode, emissions
 from thenar.runtime.segmenting.model import SegmentModel
 
 from ..evaluation.folds import Fold, leave_groups_out, trial_folds
@@ -235,7 +234,7 @@ def _decoded(
             ruled[name].append(rule.update(tick * TICK_US, standing))
     return {
         "decoder, live": (live, announced_live(live, none, LAG_TICKS)),
-        "decoder, afterwards": (decode(model, emissions(scores, model)), None),
+        "decoder, afterwards": (live_states(model, scores, len(scores)), None),
         **{name: (states := np.array(found, np.intp), states) for name, found in ruled.items()},
     }
 

@@ -16,7 +16,6 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
 from thenar.runtime.live.replay import recognised
 from thenar.runtime.scores import refused
-from thenar.runtime.segmenting.decoder import decode, emissions
 
 from ..movements.segments import OVERLAPS, Span, live_states, score_streams, segments_of
 from ..movements.streams import newest, streams_of
@@ -213,11 +212,9 @@ def _decoded(
     build: Build, scores: NDArray[np.integer], rejected: NDArray[np.bool_] | None, lag_us: int | None
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Return the state of each tick of scores (T, n_lanes), some of which are rejected, and its probability."""
-    model = build.manifest.segmenting
-    if lag_us is None:
-        states = decode(model, emissions(scores, model, rejected))
-    else:
-        states = live_states(model, scores, min(lag_us // model.tick_us, len(scores)), rejected)
+    model, whole = build.manifest.segmenting, len(scores)
+    lag = whole if lag_us is None else min(lag_us // model.tick_us, whole)
+    states = live_states(model, scores, lag, rejected)
     return states, probabilities(scores, states, build.tables.scale)
 
 

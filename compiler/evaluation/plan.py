@@ -1,6 +1,6 @@
 """Plan the fits for each table (inputs, placement, folds), and run each distinct fit once."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
@@ -18,7 +18,7 @@ from ..placement.placement import InputSelection
 from ..placement.sensors import SENSORS, SENSORS_HELP
 from ..samples import Columns, Samples
 from ..trainers.base import TRAINERS, Training
-from ..workers import in_workers
+from ..workers import MOST_JOBS, in_workers
 from .choosing import InputChoices, choose_training
 from .folds import Fold, Population, ProtocolName, Rows, may_choose, may_choose_pooled
 
@@ -26,6 +26,8 @@ Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
 # For each learner of a fit, the trainings among which each fit chooses.
 Candidates = Mapping[str, tuple[Training, ...]]
+# Rows times types of fits that are trained together: 256 KiB of doubles fit a processor's cache.
+_CELLS_TOGETHER = 1 << 15
 REFERENCE = "logitboost"  # the trainer with which the others are compared
 
 
@@ -54,29 +56,43 @@ class FoldFit:
         """Return some rows of a set with only these inputs."""
         return InputSelection.of(self.elements, self.joints).read(samples.rows(rows))
 
+    def learnt(self, samples: Samples) -> Samples:
+        """Return the training rows with only these inputs, and labels that number `grasps`."""
+        read = self.read(samples, self.fold.train)
+        labels = np.searchsorted(self.grasps, read.labels)
+        return replace(read, labels=labels, grasps=tuple(map(str, self.grasps)))
+
     def is_blind(self, samples: Samples) -> bool:
         """Return whether none of the inputs varies among the training rows."""
         return not self.read(samples, self.fold.train).varies
 
 
 def predictions(
-    samples: Samples, fit: FoldFit, candidates: Candidates, groups: NDArray[np.str_] | None = None
-) -> Labels:
-    """Return the labels predicted for the fold's test rows, by the best of the learner's candidates.
+    samples: Samples, fits: Sequence[FoldFit], candidates: Candidates, groups: NDArray[np.str_] | None = None
+) -> list[Labels]:
+    """Return the labels predicted for the test rows of each fold, by the best of the learner's candidates.
 
     A blind fit predicts the most frequent label of the training rows, which is the accuracy to beat. `groups` (n,) are
     what each row is left out with, None: its trial.
     """
-    grasps, rows = np.array(fit.grasps, dtype=np.intp), fit.fold.train
-    read, test = fit.read(samples, rows), fit.read(samples, fit.fold.test)
-    if not read.varies:
-        return np.full(len(fit.fold.test), read.most_frequent)
-    learning = replace(read, labels=np.searchsorted(grasps, read.labels), grasps=tuple(map(str, fit.grasps)))
-    (training,) = candidates[""]
-    if fit.learner:
-        fitting = choose_training(learning, candidates[fit.learner], groups=None if groups is None else groups[rows])
-        training = Training.chosen(fitting, masked=training.masked)
-    return grasps[winners(training.draft(learning).scores(test.switches, test.codes))]
+    (usual,) = candidates[""]
+    learning = [fit.learnt(samples) for fit in fits]
+    pairs = [*zip(fits, learning, strict=True)]
+    drafts = iter(usual.drafts([learnt for fit, learnt in pairs if learnt.varies and not fit.learner]))
+    labels = []
+    for fit, learnt in pairs:
+        grasps, test = np.array(fit.grasps, dtype=np.intp), fit.read(samples, fit.fold.test)
+        if not learnt.varies:
+            labels.append(np.full(len(fit.fold.test), grasps[learnt.most_frequent]))
+            continue
+        if fit.learner:
+            by = None if groups is None else groups[fit.fold.train]
+            fitting = choose_training(learnt, candidates[fit.learner], groups=by)
+            model = Training.chosen(fitting, masked=usual.masked).draft(learnt)
+        else:
+            model = next(drafts)
+        labels.append(grasps[winners(model.scores(test.switches, test.codes))])
+    return labels
 
 
 def run_fits(
@@ -95,15 +111,19 @@ def run_fits(
     """
     todo = list(dict.fromkeys(fits))
     results: dict[FoldFit, Labels] = {}
-    tasks = ((number, (samples, fit, candidates, groups)) for number, fit in enumerate(todo))
-    for number, labels in in_workers(_numbered, tasks, jobs):
-        results[todo[number]] = labels
-        if progress is not None:
-            progress(len(results), len(todo))
+    cells = max((len(fit.fold.train) * len(fit.grasps) for fit in todo), default=1)
+    together = max(1, min(_CELLS_TOGETHER // cells, len(todo) // MOST_JOBS))
+    batches = [todo[start : start + together] for start in range(0, len(todo), together)]
+    tasks = ((number, (samples, batch, candidates, groups)) for number, batch in enumerate(batches))
+    for number, batch in in_workers(_numbered, tasks, jobs):
+        for fit, labels in zip(batches[number], batch, strict=True):
+            results[fit] = labels
+            if progress is not None:
+                progress(len(results), len(todo))
     return results
 
 
-def _numbered(task: tuple[int, tuple[Any, ...]]) -> tuple[int, Labels]:
+def _numbered(task: tuple[int, tuple[Any, ...]]) -> tuple[int, list[Labels]]:
     return task[0], predictions(*task[1])
 
 
@@ -281,7 +301,7 @@ class Planner:
 
     def elements(self, rows: Rows) -> Elements:
         """Return the elements available in these rows."""
-        return self.choices.available(rows, self.recipe.levels)
+        return self.choices.available(np.sort(rows), self.recipe.levels)
 
     def chosen(self, rows: Rows, **changes: Any) -> Elements:
         """Return the elements that the recipe, with other choices `changes`, keeps from these rows, in any order."""

@@ -33,7 +33,6 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Faults, Faulty
 from thenar.runtime.model.integers import IntegerTables
-from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..elementary import Floats, log, softmax
@@ -170,7 +169,7 @@ def count_faults(
     correct. `groups` are indices of inputs that fail together, switches first, then joints.
     """
     terms = _terms(tables)
-    joined = [_Joined.of(tables, grid) for grid in tables.grids]
+    joined = _joined(tables)
     bins = (np.searchsorted(_steps(tables, joint), codes[:, joint]) for joint in range(tables.n_joints))
     at = np.vstack([bits.T.astype(np.intp), *(column[np.newaxis] for column in bins)])
     order, trial = np.argsort(trials, kind="stable"), np.unique(np.sort(trials), return_inverse=True)[1]
@@ -226,24 +225,17 @@ def _steps(tables: IntegerTables, joint: int) -> Steps:
     return np.union1d(tables.binned(joint).thresholds, tables.steps_of(joint)).astype(np.int64)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Joined:
-    """The contribution of two inputs together, (values + 1, values + 1, K); the last value of each means lost."""
-
-    inputs: tuple[int, int]
-    rows: Scores
-
-    @classmethod
-    def of(cls, tables: IntegerTables, grid: Grid) -> "_Joined":
+def _joined(tables: IntegerTables) -> dict[tuple[int, int], Scores]:
+    """Return the contribution of pairs of inputs together, (values + 1, values + 1, K); the last value of each means
+    lost.
+    """
+    found = {}
+    for grid in tables.grids:
         codes = (np.concatenate([[0], _steps(tables, joint) + 1, [0]]) for joint in grid.joints)
         one, other = np.meshgrid(*codes, indexing="ij")
         rows = grid.of(one.ravel(), other.ravel()).reshape(*one.shape, -1)
-        return cls((tables.n_switches + grid.joints[0], tables.n_switches + grid.joints[1]), rows.astype(np.int32))
-
-    def turned(self, first: int) -> tuple[int, Scores]:
-        """Return the index of the other input than `first`, and the rows with the axis of `first` first."""
-        one, other = self.inputs
-        return (other, self.rows) if first == one else (one, self.rows.swapaxes(0, 1))
+        found[tables.n_switches + grid.joints[0], tables.n_switches + grid.joints[1]] = rows.astype(np.int32)
+    return found
 
 
 class _Block:
@@ -253,7 +245,7 @@ class _Block:
         self,
         tables: IntegerTables,
         terms: Sequence[_Term],
-        joined: Sequence[_Joined],
+        joined: Mapping[tuple[int, int], Scores],
         at: Numbers,
         labels: Numbers,
         trials: Numbers,
@@ -272,17 +264,18 @@ class _Block:
             (term.mean * self._k)[:, None] - rows[:, values]
             for term, rows, values in zip(terms, self._terms, at, strict=True)
         ]
-        self._joined = {one: pair.turned(one) for pair in joined for one in pair.inputs}
+        # For each paired input, the other one, and the rows of both with the axis of the former first.
+        self._joined = {one: (other, rows) for (one, other), rows in joined.items()}
+        self._joined |= {other: (one, rows.swapaxes(0, 1)) for (one, other), rows in joined.items()}
         # If both inputs of a pair are lost, the correction to the sum of their separate differences.
         self._both: dict[tuple[int, int], Scores] = {}
-        for pair in joined:
-            (one, other), now = pair.inputs, self._added(pair.inputs[0], at[pair.inputs[0]])
+        for pair, rows in joined.items():
+            now = self._added(pair[0], at[pair[0]])
             self.whole += now
-            alone = [self._added(each, -1) - now for each in pair.inputs]
-            self._both[pair.inputs] = (pair.rows[-1, -1] * self._k)[:, None] - now - sum(alone)
-            self.lost[one], self.lost[other] = (
-                self.lost[each] + more for each, more in zip(pair.inputs, alone, strict=True)
-            )
+            alone = [self._added(each, -1) - now for each in pair]
+            self._both[pair] = (rows[-1, -1] * self._k)[:, None] - now - sum(alone)
+            for each, more in zip(pair, alone, strict=True):
+                self.lost[each] = self.lost[each] + more
 
     def _added(self, one: int, value: Numbers | int) -> Scores:
         """Return the contribution (K, n) of a paired input with this value in each row, together with its partner."""

@@ -23,7 +23,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thenar.runtime.segmenting.decoder import Decoder, emissions
+from thenar.runtime.errors import BuildError
+from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import STEPS, SegmentModel, gain_of
 
 from .streams import Stream
@@ -353,9 +354,19 @@ def model_of(
 def live_states(
     model: SegmentModel, biased_scores: NDArray[np.integer], lag_ticks: int, refused: NDArray[np.bool_] | None = None
 ) -> Labels:
-    """Return the states (T,) that a live decoder reports for scores (T, n_lanes), `lag_ticks` after each tick."""
+    """Return the states (T,) that a live decoder reports for scores (T, n_lanes), `lag_ticks` after each tick.
+
+    With a lag of T they are those of the cheapest segmentation of the whole stream. Raises BuildError for scores of
+    other classes.
+    """
+    if biased_scores.ndim != 2 or biased_scores.shape[1] != model.n_lanes:
+        raise BuildError(
+            f"scores have shape {biased_scores.shape}, but the segment model takes {model.n_lanes} a frame"
+        )
     decoder = Decoder(model, lag_ticks)
-    states = [decoder.take(costs).state for costs in emissions(biased_scores, model, refused).tolist()][lag_ticks:]
+    no = np.zeros(len(biased_scores), bool) if refused is None else refused
+    ticks = zip(biased_scores.tolist(), no.tolist(), strict=True)
+    states = [decoder.push(scores, rejected).state for scores, rejected in ticks][lag_ticks:]
     return np.array(states + decoder.finish(), np.intp)
 
 

@@ -8,7 +8,6 @@ import msgspec
 from thenar.runtime.build import load_manifest
 from thenar.runtime.files import read_file
 from thenar.runtime.names import fault, shortened
-from thenar.runtime.nesting import check_json
 
 from ..samples import TrainingError
 
@@ -39,13 +38,12 @@ def _of_file(path: Path) -> tuple[str, ...]:
     if text.lstrip()[:1] not in ("{", "["):
         return tuple(filter(None, map(str.strip, text.splitlines())))
     try:
-        check_json(text.encode())
         found = msgspec.json.decode(text)
         if isinstance(found, dict):
             # Of chosen sensors, joints have no place on the hand.
             sensors = msgspec.convert(found.get("switches", found.get("chosen")), list[dict[str, Any]])
             found = [sensor.get("name") for sensor in sensors if sensor.get("kind") != "joint"]
         return msgspec.convert(found, tuple[str, ...])
-    except ValueError as reason:
+    except (ValueError, RecursionError) as reason:
         why = shortened(str(reason))
         raise TrainingError(f"{path} is not a list of switches ({why}): {_WANTED}") from None

@@ -23,7 +23,6 @@ from numpy.typing import ArrayLike, NDArray
 from thenar.runtime.errors import FormatError
 from thenar.runtime.files import read_file, write_atomically
 from thenar.runtime.names import LONGEST_NAME, fault, shortened
-from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
 from ..arrays import AnyArray, groups, pack, unpack
@@ -356,7 +355,7 @@ class GraspSet:
         _, payload = unseal(read_file(Path(path), LARGEST, FormatError), KIND, VERSION, name)
         try:
             return _unpack(len(payload), *unpack(payload, name))
-        except (RecordingError, msgspec.DecodeError, ValueError) as reason:
+        except (RecordingError, msgspec.DecodeError, ValueError, RecursionError) as reason:
             raise FormatError(f"{name} is inconsistent: {reason}") from reason
 
     def save(self, path: str | Path) -> None:
@@ -426,7 +425,6 @@ def _pack(grasp_set: GraspSet) -> bytes:
 
 
 def _unpack(size: int, header_bytes: bytes, arrays: dict[str, AnyArray]) -> GraspSet:
-    check_json(header_bytes)
     header = msgspec.json.decode(header_bytes, type=_Header)
     _check_arrays(header, arrays)
     # Read-only views, which the set uses without a copy.

@@ -125,9 +125,12 @@ class Trainer(ABC):
             and settings only, to the last bit.
         """
 
-    def draft(self, samples: "Samples", settings: Mapping[str, Any]) -> Model:
-        """Return a model to compare settings and trainers by, which need not be as precise as that of `train`."""
-        return self.train(samples, {**settings, **self.drafting})
+    def drafts(self, several: "Sequence[Samples]", settings: Mapping[str, Any]) -> Sequence[Model]:
+        """Return models to compare settings and trainers by, which need not be as precise as those of `train`.
+
+        Trainers override this method if several sets, each with inputs that vary, take less time together.
+        """
+        return [self.train(samples, {**settings, **self.drafting}) for samples in several]
 
     def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> tuple[Model, ...]:
         """Return a model for each of these numbers of rounds, from one training; see `train`.
@@ -219,7 +222,11 @@ class Training:
 
     def draft(self, samples: "Samples") -> Model:
         """Return the trainer's model of `samples` for a comparison."""
-        return TRAINERS.named(self.trainer).draft(self._rows(samples), self.settings)
+        return self.drafts([samples])[0]
+
+    def drafts(self, several: "Sequence[Samples]") -> Sequence[Model]:
+        """Return the trainer's models of several samples for a comparison."""
+        return TRAINERS.named(self.trainer).drafts([self._rows(samples) for samples in several], self.settings)
 
     def stages(self, samples: "Samples", rounds: Sequence[int]) -> tuple[Model, ...]:
         """Return the trainer's models of `samples` after each of these numbers of rounds."""

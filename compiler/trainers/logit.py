@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +27,6 @@ FINEST = 1e-12  # the least tolerance
 _FEWER = 3.0  # the pull on the weights that remain is smaller by this factor
 
 
-class Rise(NamedTuple):
-    """A column's line: row (K,) times (x - low), x between low and high."""
-
-    low: float
-    high: float
-    row: Floats
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ColumnTables:
     """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of any numbers.
@@ -42,13 +34,13 @@ class ColumnTables:
     bias   (K,)
     edges  for each column, ascending (B - 1,): the bin of x is the number of edges below it
     rows   for each column (B, K)
-    lines  for some columns, an additional contribution in proportion to x
+    lines  for some columns (low, high, row): an additional contribution, row (K,) times (x - low), of x between both
     """
 
     bias: Floats
     edges: tuple[Floats, ...]
     rows: tuple[Floats, ...]
-    lines: Mapping[int, Rise] = field(default_factory=dict)
+    lines: Mapping[int, tuple[float, float, Floats]] = field(default_factory=dict)
 
     def scores(self, X: NDArray[np.generic]) -> Floats:
         """Return F (n, K) of X (n, d)."""
@@ -180,7 +172,7 @@ def tables_of(columns: Sequence[Column], rows: Floats) -> ColumnTables:
     for number, (column, own) in enumerate(zip(columns, parts, strict=True)):
         if column.line is not None:
             bias = bias - column.line.centre * own[0]
-            lines[number] = Rise(column.line.low, column.line.high, own[0] / column.line.unit)
+            lines[number] = column.line.low, column.line.high, own[0] / column.line.unit
             own = np.zeros_like(own)
         tables.append(np.vstack([np.zeros((column.first, own.shape[1])), own]))
     return ColumnTables(bias, tuple(column.edges for column in columns), tuple(tables), lines)

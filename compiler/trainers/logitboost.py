@@ -5,7 +5,7 @@ sums are exact (elementary), a branch with almost no weight counts as empty, and
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,11 +15,14 @@ from ..elementary import Floats, add_exactly, softmax, softmax_and_loss
 from ..samples import TrainingError
 from ..workers import check_memory
 from .base import MAX_BINS, Number, Report, Setting, Trainer, check_rows
-from .binning import bin_columns
+from .binning import Binned, bin_columns
 from .stumps import Stumps, Targets, centred, fit_stumps
 
 if TYPE_CHECKING:
     from ..samples import Samples
+
+# Columns, thresholds and values of a round's stumps.
+_Round = tuple[NDArray[np.int32], Floats, Floats]
 
 # Ties are counted on a grid whose units grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
@@ -57,8 +60,6 @@ def boost(
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X, max_bins)
     check_memory(len(X), n_classes, TrainingError, len(binned.two.columns), len(binned.many.columns))
-    member = labels == np.arange(n_classes)[:, np.newaxis]
-    scores = carry = np.zeros((n_classes, len(X)))
     losses: list[float] = []
 
     def shares(scores: Floats) -> Floats:
@@ -68,20 +69,65 @@ def boost(
         losses.append(loss)
         return probability
 
-    probability = shares(scores)
-    fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
+    fitted: list[_Round] = []
     stopped = False
-    while len(fitted) < rounds and binned.columns and not stopped:
-        targets = Targets(*weights_and_responses(probability, member, z_max, weights))
-        stumps = fit_stumps(binned, targets, z_max)
-        # Drop the outputs: with a million rows they would take a hundred megabytes a round.
-        fitted.append((stumps.columns, stumps.thresholds, stumps.values))
-        scores, carry = add_exactly(scores, carry, centred(stumps.outputs, shrinkage))
-        probability = shares(scores + carry)
+    member = labels == np.arange(n_classes)[:, np.newaxis]
+    for stumps in _rounds([binned], member, rounds if binned.columns else 0, shrinkage, z_max, weights, shares):
+        fitted.append(stumps)
         stopped = tolerance is not None and abs(losses[-2] - losses[-1]) < tolerance
         if on_round is not None:
             on_round(len(fitted), rounds)
-    return _stack(fitted, X.shape[1], n_classes, shrinkage, stopped), tuple(losses)
+        if stopped:
+            break
+    return _stack(fitted, [binned], n_classes, shrinkage, stopped)[0], tuple(losses)
+
+
+def boost_together(
+    sets: Sequence[tuple[NDArray[np.generic], NDArray[np.intp]]],
+    n_classes: int,
+    *,
+    rounds: int = 100,
+    shrinkage: float = 1.0,
+    z_max: float = 3.0,
+    max_bins: int | None = None,
+) -> list[Stumps]:
+    """Return the ensembles that `boost` returns for each X (n, d) and its labels (n,), to the last bit.
+
+    All sets have n rows. With few rows, this takes less than half the time.
+    """
+    _check_options(rounds, shrinkage, z_max, None, max_bins)
+    for X, labels in sets:
+        check_rows(X, labels, n_classes, None)
+    check_memory(sum(len(X) for X, _ in sets), n_classes, TrainingError)
+    binned = [bin_columns(X, max_bins) for X, _ in sets]
+    member = np.concatenate([labels for _, labels in sets]) == np.arange(n_classes)[:, np.newaxis]
+    return _stack([*_rounds(binned, member, rounds, shrinkage, z_max, None, softmax)], binned, n_classes, shrinkage)
+
+
+def _rounds(
+    sets: Sequence[Binned],
+    member: NDArray[np.bool_],
+    rounds: int,
+    shrinkage: float,
+    z_max: float,
+    weights: Floats | None,
+    shares: Callable[[Floats], Floats],
+) -> Iterator[_Round]:
+    """Yield the columns, thresholds and values of each round of stumps: K classes of F sets of n rows, side by side.
+
+    member  (K, F n): the classes of rows; weights: (F n,), None for 1
+    shares  returns the probabilities (K, F n) for scores (K, F n), before the first round and after every one
+    """
+    scores = carry = np.zeros(member.shape)
+    probability = shares(scores)
+    by_set = len(member) * len(sets), -1
+    for _ in range(rounds):
+        wanted = weights_and_responses(probability, member, z_max, weights)
+        stumps = fit_stumps(sets, Targets(*(values.reshape(by_set) for values in wanted)), z_max)
+        scores, carry = add_exactly(scores, carry, centred(stumps.outputs.reshape(member.shape), shrinkage))
+        probability = shares(scores + carry)
+        # Without the outputs: with a million rows they would take a hundred megabytes a round.
+        yield stumps.columns, stumps.thresholds, stumps.values
 
 
 def weights_and_responses(
@@ -99,17 +145,17 @@ def weights_and_responses(
 
 
 def _stack(
-    fitted: list[tuple[NDArray[np.int32], Floats, Floats]], n_inputs: int, n_classes: int, shrinkage: float, early: bool
-) -> Stumps:
-    rounds = len(fitted)
-    return Stumps(
-        n_inputs,
-        np.array([columns for columns, _, _ in fitted], dtype=np.int32).reshape(rounds, n_classes),
-        np.array([thresholds for _, thresholds, _ in fitted]).reshape(rounds, n_classes),
-        np.array([values for _, _, values in fitted]).reshape(rounds, n_classes, 3),
-        shrinkage,
-        early,
-    )
+    fitted: Sequence[_Round], sets: Sequence[Binned], n_classes: int, shrinkage: float, early: bool = False
+) -> list[Stumps]:
+    """Return the ensemble of each set."""
+    shape = len(fitted), n_classes, len(sets)
+    columns = np.array([columns for columns, _, _ in fitted], dtype=np.int32).reshape(shape)
+    thresholds = np.array([thresholds for _, thresholds, _ in fitted]).reshape(shape)
+    values = np.array([values for _, _, values in fitted]).reshape(*shape, 3)
+    return [
+        Stumps(binned.n_columns, columns[..., at], thresholds[..., at], values[:, :, at], shrinkage, early)
+        for at, binned in enumerate(sets)
+    ]
 
 
 def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None) -> None:
@@ -155,6 +201,14 @@ class LogitBoost(Trainer):
         """Return the ensemble. Raises TrainingError for settings that make no sense."""
         given = {**settings, "on_round": report, "with_losses": False}
         return boost(samples.inputs, samples.labels, samples.n_classes, **given)[0]
+
+    def drafts(self, several: "Sequence[Samples]", settings: Mapping[str, Any]) -> list[Stumps]:
+        """Return the ensembles of several sets: those of as many rows are trained together."""
+        sizes = {(len(samples.labels), samples.n_classes) for samples in several}
+        if len(several) == 1 or len(sizes) != 1 or settings.get("tolerance") is not None:
+            return [self.train(samples, settings) for samples in several]
+        given = {name: value for name, value in settings.items() if name != "tolerance"}
+        return boost_together([(samples.inputs, samples.labels) for samples in several], several[0].n_classes, **given)
 
     def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> tuple[Stumps, ...]:
         """Return the ensembles of the first rounds, cut from the longest training."""

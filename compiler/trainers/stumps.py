@@ -1,11 +1,13 @@
 """Decision stumps: an ensemble of one per round and class, and the best ones for one round's weights and responses.
 
+Several training sets of as many rows are fitted side by side: on few rows, numpy's calls take longer than its sums.
+
 A stump's residual sum of squares is sum w z^2 less the explained part, sum over branches C_b^2 / W_b with W_b = sum w
 and C_b = sum w z. The first term is the same for every stump, so explained parts are compared: sums of positive terms,
 which avoid the cancellation in comparing small residuals.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,8 @@ from .binning import Binned, SplitSums
 # units of the class on the grid; with less, its mean would consist of rounding errors. It is a share, not a number of
 # units, so that three copies of a set give the same result as one.
 EMPTY_SHARE = 2.0**-38
+# Elements of the outputs of several rounds that are computed together: 256 KiB of doubles.
+_STAGED_ELEMENTS = 1 << 15
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,14 +57,19 @@ class Stumps:
         """Yield the scores F (n, K) after each round, for inputs (n, n_inputs); every array yielded is a new one."""
         if X.ndim != 2 or X.shape[1] != self.n_inputs:
             raise ValueError(f"inputs have shape {X.shape}, the ensemble expects (n, {self.n_inputs})")
+        if not len(self.columns) == len(self.thresholds) == len(self.values):
+            raise ValueError("columns, thresholds and values are of different numbers of rounds")
         scores = carry = np.zeros((self.n_classes, len(X)))
-        for columns, thresholds, values in zip(self.columns, self.thresholds, self.values, strict=True):
-            inputs = X[:, columns].T.astype(np.float64)
-            left, right, missing = values.T[:, :, np.newaxis]
-            outputs = np.where(inputs <= thresholds[:, np.newaxis], left, right)
+        several = max(1, _STAGED_ELEMENTS // max(1, scores.size))
+        for start in range(0, self.n_rounds, several):
+            rounds = slice(start, start + several)
+            inputs = X.T[self.columns[rounds].T].astype(np.float64)
+            left, right, missing = self.values[rounds].T[..., np.newaxis]
+            outputs = np.where(inputs <= self.thresholds[rounds].T[..., np.newaxis], left, right)
             outputs = np.where(np.isnan(inputs), missing, outputs)
-            scores, carry = add_exactly(scores, carry, centred(outputs, self.shrinkage))
-            yield (scores + carry).T
+            for contribution in centred(outputs, self.shrinkage).swapaxes(0, 1):
+                scores, carry = add_exactly(scores, carry, contribution)
+                yield (scores + carry).T
 
     @property
     def magnitude(self) -> float:
@@ -77,7 +86,7 @@ class Stumps:
 
 
 def centred(outputs: Floats, shrinkage: float) -> Floats:
-    """Return the contribution of a round to F (K, n), given its stumps' outputs (K, n): LogitBoost's symmetric step.
+    """Return the contribution of rounds to F, given their stumps' outputs (K, ...): LogitBoost's symmetric step.
 
     f_j = (K - 1)/K * (g_j - mean_k g_k) with g = shrinkage * output (Friedman, Hastie, Tibshirani 2000, algorithm 6).
     The mean over classes is zero except for rounding, K + 6 units of 2^-53 of the largest |g|, so M rounds leave a mean
@@ -101,7 +110,10 @@ def spread(outputs: Floats, n_classes: int, shrinkage: float) -> tuple[Floats, F
 
 
 class Targets:
-    """Weights w and weighted responses w z of one round (K, n), 1 <= |z| <= z_max, and how to sum them exactly."""
+    """Weights w and weighted responses w z of one round (K, n), 1 <= |z| <= z_max, and how to sum them exactly.
+
+    With several training sets, K counts the classes of each, in the order of classes, then sets.
+    """
 
     def __init__(self, weights: Floats, responses: Floats) -> None:
         """Put both on grids: coarse ones to compare stumps, and the remainders on fine ones for branch values."""
@@ -122,7 +134,7 @@ class Targets:
 
 @dataclass(frozen=True, slots=True)
 class FittedStumps:
-    """The stumps of one round, and their outputs on the training rows."""
+    """The stumps of one round, and their outputs on the training rows; K counts classes as in `Targets`."""
 
     columns: NDArray[np.int32]  # (K,)
     thresholds: Floats  # (K,)
@@ -130,18 +142,27 @@ class FittedStumps:
     outputs: Floats  # (K, n)
 
 
-def fit_stumps(binned: Binned, targets: Targets, z_max: float) -> FittedStumps:
-    """Fit one stump per class. Ties go to the lowest column, then to the lowest threshold. |value| <= z_max."""
-    columns, splits = _best_splits(binned, targets, _tie_bound(targets, z_max))
-    chosen = [(binned.columns[column], split) for column, split in zip(columns.tolist(), splits.tolist(), strict=True)]
-    # A column of two values has bits for bins, and one split.
-    left = np.array([~column.bins if column.bins.dtype == bool else column.bins <= split for column, split in chosen])
+def fit_stumps(sets: Sequence[Binned], targets: Targets, z_max: float) -> FittedStumps:
+    """Fit one stump per class. Ties go to the lowest column, then to the lowest threshold. |value| <= z_max.
+
+    `sets` have as many rows each, and targets of as many classes.
+    """
+    units, totals, bounds = targets.both.units, targets.both.units.sum(axis=1), _tie_bound(targets, z_max)
+    columns, splits = np.empty((2, len(bounds)), dtype=np.intp)
+    for number, binned in enumerate(sets):
+        its = slice(number, None, len(sets))
+        columns[its], splits[its] = _best_splits(binned, units[its], totals[its], bounds[its])
+    numbers = zip(columns.tolist(), splits.tolist(), strict=True)
+    chosen = [(sets[row % len(sets)].columns[column], split) for row, (column, split) in enumerate(numbers)]
+    left = np.empty(targets.weights.units.shape, dtype=np.bool_)
+    for row, (column, split) in zip(left, chosen, strict=True):
+        np.less_equal(column.bins, split, out=row)
     missing = np.array([column.missing for column, _ in chosen]) if any(column.lacks for column, _ in chosen) else None
     values = _branch_values(targets, left, missing, z_max)
     outputs = np.where(left, values[:, :1], values[:, 1:2])
     if missing is not None:
         outputs = np.where(missing, values[:, 2:], outputs)
-    thresholds = np.array([column.edges[split] for column, split in chosen])
+    thresholds = np.array([column.edges.item(split) for column, split in chosen])
     return FittedStumps(columns.astype(np.int32), thresholds, values, outputs)
 
 
@@ -159,10 +180,15 @@ def _tie_bound(targets: Targets, z_max: float) -> Floats:
     return bound
 
 
-def _best_splits(binned: Binned, targets: Targets, tie_bound: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the column and split (K,) that explain most, for each class; ties go to the lowest."""
+def _best_splits(
+    binned: Binned, units: Floats, totals: Floats, tie_bound: Floats
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the column and split (K,) that explain most, for each class; ties go to the lowest.
+
+    `units` (2K, n) are the weights and weighted responses on their grids, `totals` (2K,) their sums.
+    """
     n_classes = len(tie_bound)
-    by_row, totals = np.ascontiguousarray(targets.both.units.T), targets.both.units.sum(axis=1)
+    by_row = np.ascontiguousarray(units.T)
     # Nothing is explained for a class without weight, where at most some responses have not underflown.
     least = np.where(totals[:n_classes] > 0, totals[:n_classes] * EMPTY_SHARE, np.inf)
     explained = np.full((binned.n_columns, n_classes), -np.inf)

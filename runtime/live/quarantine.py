@@ -36,7 +36,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from msgspec import Struct
 from numpy.typing import NDArray
 
 from ..build import Build
@@ -99,12 +98,14 @@ class StuckTest:
 
     def weigh(self, biased_scores: Sequence[int], closed: Mask, read: Mask, lost: Mask) -> None:
         """Take a grasp: the scores of a frame, the switches closed and read, and those scored as lost."""
-        flags = (_flags(mask, len(self._rows)) for mask in (closed, read, lost))
-        grasp = _Grasp(np.array(biased_scores, np.int64), *flags)
-        shares, held = self._shares_of(grasp), self._held(grasp)
-        self.sums = np.maximum(self.sums + self._evidence(grasp, shares, held), 0)
-        due = np.where(grasp.read & held, 255 - shares[1], 0)
-        self._due, self._seen = self._due + due, self._seen + due * grasp.closed
+        scores = np.array(biased_scores, np.int64)
+        shut, shown, without = (_flags(mask, len(self._rows)) for mask in (closed, read, lost))
+        shares, contacts = self._shares_of(scores, shut, without), int(np.count_nonzero(shut & ~without))
+        # With fewer than half of the likeliest type's contacts, an open switch means nothing.
+        held = 4 * 255 * contacts >= int(self._contacts[int(scores.argmax())])
+        self.sums = np.maximum(self.sums + self._evidence(shut, shown, shares, held, contacts <= 1), 0)
+        due = np.where(shown & held, 255 - shares[1], 0)
+        self._due, self._seen = self._due + due, self._seen + due * shut
         self._judge()
 
     def _judge(self) -> None:
@@ -119,43 +120,25 @@ class StuckTest:
             kind, switch = divmod(int(fresh.argmax()), len(self._rows))
             self.stuck[switch] = kind
 
-    def _shares_of(self, grasp: "_Grasp") -> Ints:
+    def _shares_of(self, biased_scores: Ints, closed: Flags, lost: Flags) -> Ints:
         """Return the share of grasps, in 255ths (2, s), in which by training a switch is closed, and open, given the
         type as far as all other inputs determine it.
         """
-        own = np.where(grasp.lost[:, np.newaxis], 0, self._means - self._rows * grasp.closed[:, np.newaxis])
-        scores = grasp.biased_scores + own
+        scores = biased_scores + np.where(lost[:, np.newaxis], 0, self._means - self._rows * closed[:, np.newaxis])
         behind = (scores.max(axis=1, keepdims=True) - scores) * self._gain >> 16
         weights = self._weights[np.minimum(behind, len(self._weights) - 1)]
         found: Ints = (self._shares * weights).sum(axis=2) // weights.sum(axis=1)
         return found
 
-    def _held(self, grasp: "_Grasp") -> bool:
-        """Return whether at least half of the likeliest type's contacts are there: with fewer, an open switch means
-        nothing.
-        """
-        contacts = int(self._contacts[int(grasp.biased_scores.argmax())])
-        return 4 * 255 * int(np.count_nonzero(grasp.closed & ~grasp.lost)) >= contacts
-
-    def _evidence(self, grasp: "_Grasp", shares: Ints, held: bool) -> Ints:
+    def _evidence(self, closed: Flags, read: Flags, shares: Ints, held: bool, alone: bool) -> Ints:
         # Doubt whether this hand closes a switch at all decreases as it is seen to do so.
         closes = (255 - shares[1]) * (self._seen + _DOUBT) // (self._due + 2 * _DOUBT)
         shares = np.stack([shares[0], 255 - closes])
-        shown = np.stack([grasp.closed, ~grasp.closed])
-        alone = np.count_nonzero(grasp.closed & ~grasp.lost) <= 1
+        shown = np.stack([closed, ~closed])
         sticks = np.stack([(self._alone if alone else self._shown)[shares[0]], self._shown[shares[1]]])
         evidence = np.where(shown, sticks, self._moved[shares])
-        evidence[1] *= held | grasp.closed
-        return evidence * grasp.read
-
-
-class _Grasp(Struct, frozen=True):
-    """An observed grasp: scores (K,), and which switches were closed, read, and scored as lost (s,)."""
-
-    biased_scores: Ints
-    closed: Flags
-    read: Flags
-    lost: Flags
+        evidence[1] *= held | closed
+        return evidence * read
 
 
 class Chattering:

@@ -188,7 +188,6 @@ def _unpack(layout: Struct, message: bytes) -> tuple[bytes, ...] | tuple[int, ..
 
 _CLOSED, _LOST = 1, 2
 _TIME_BYTES = 8
-_SPREAD = [bytes(byte >> bit & 1 for bit in range(8)) for byte in range(256)]
 
 
 def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
@@ -198,9 +197,8 @@ def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
     """
     if (frame.closed | frame.lost) >> switches:
         raise FrameError(f"a frame has bits beyond the {switches} recorded switches")
-    states = _spread(frame.closed, switches)
-    if frame.lost:
-        states = bytes(a + _LOST * b for a, b in zip(states, _spread(frame.lost, switches), strict=True))
+    closed, lost = switch_matrix([frame.closed, frame.lost], switches).view(np.uint8)
+    states: bytes = (closed * _CLOSED + lost * _LOST).tobytes()
     if frame.glove is None:
         return states
     return states + frame.glove.time_us.to_bytes(_TIME_BYTES, "little") + glove_bytes(frame.glove, sensors)
@@ -263,11 +261,6 @@ def switch_matrix(masks: Sequence[Mask], switches: int) -> NDArray[np.bool_]:
     rows = np.frombuffer(b"".join(mask.to_bytes(length, "little") for mask in masks), np.uint8)
     bits = np.unpackbits(rows.reshape(len(masks), length), axis=1, count=switches, bitorder="little")
     return bits.view(np.bool_)
-
-
-def _spread(mask: Mask, switches: int) -> bytes:
-    """Return a byte of 0 or 1 for each switch."""
-    return b"".join(map(_SPREAD.__getitem__, mask.to_bytes((switches + 7) // 8, "little")))[:switches]
 
 
 def _gather(states: NDArray[np.uint8], flag: int) -> Mask:

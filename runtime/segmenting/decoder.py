@@ -16,12 +16,9 @@ from collections.abc import Sequence
 from operator import add
 
 import msgspec
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from thenar.drivers.errors import SettingError
 
-from ..errors import BuildError
 from ..published import NONE, State
 from .model import SegmentModel
 
@@ -188,12 +185,8 @@ class Decoder:
 
     def push(self, biased_scores: Sequence[int], refused: bool = False) -> Decoded:
         """Take the scores of the next tick, and whether its frame is refused (for models with a refusal)."""
-        return self.take(self._model.costs(biased_scores, refused))
-
-    def take(self, costs: Sequence[int]) -> Decoded:
-        """Take the costs of the next tick, one for each state, as `emissions` returns them."""
         paths = self._paths
-        paths.step(costs)
+        paths.step(self._model.costs(biased_scores, refused))
         tick, newest, begun = paths.tick - self._lag, *paths.newest
         if tick < 0:
             state, start = self._model.n_types, 0
@@ -296,43 +289,3 @@ class LiveSegments:
     def _time_us(self, tick: int) -> int:
         first, time_us = next((each for each in reversed(self._set) if each[0] <= tick), self._set[0])
         return time_us + (tick - first) * self.tick_us
-
-
-def emissions(scores: ArrayLike, model: SegmentModel, refused: ArrayLike | None = None) -> NDArray[np.int64]:
-    """Return the costs of frames for the states, (T, K + 1), as `SegmentModel.costs` does frame by frame.
-
-    Parameters
-    ----------
-    scores : array of int, shape (T, n_lanes)
-        The frames' scores.
-    model : SegmentModel
-        Its `shift`, `gain`, `most` and `refusal` are used.
-    refused : array of bool, shape (T,), optional
-        Frames that the build's rejection refuses; for a model with a refusal.
-
-    Raises
-    ------
-    BuildError
-        If the scores have another number of classes.
-    """
-    biased_scores = np.asarray(scores, np.int64)
-    if biased_scores.ndim != 2 or biased_scores.shape[1] != model.n_lanes:
-        raise BuildError(
-            f"scores have shape {biased_scores.shape}, but the segment model takes {model.n_lanes} a frame"
-        )
-    behind = biased_scores.max(axis=1, initial=np.iinfo(np.int64).min, keepdims=True) - biased_scores
-    found: NDArray[np.int64] = np.minimum((behind >> model.shift) * model.gain >> 8, model.most)
-    if model.refusal is None:
-        return found
-    no = np.zeros(len(biased_scores), bool) if refused is None else np.asarray(refused, bool)
-    more = np.where(no, model.refusal, 0)[:, np.newaxis]
-    return np.hstack([found + more, model.refusal - more])
-
-
-def decode(model: SegmentModel, emissions: ArrayLike) -> NDArray[np.intp]:
-    """Return the states (T,) of the cheapest segmentation of a whole stream, of the emissions (T, K + 1)."""
-    costs = np.asarray(emissions, np.int64).reshape(-1, model.n_types + 1)
-    decoder = Decoder(model, len(costs))
-    for row in costs.tolist():
-        decoder.take(row)
-    return np.array(decoder.finish(), np.intp)

@@ -1,9 +1,7 @@
 """Live topics for Foxglove, over Foxglove's WebSocket protocol (extra `foxglove`); messages are JSON, with schemas.
 
     /thenar/grasp     the grasp type, probability, state, segment and health
-    /thenar/scores    score and probability of every grasp type, with `grasp`
-    /thenar/switches  names of the switches that are closed or lost, with `grasp`
-    /thenar/joints    angles of calibrated joints in rad, and the codes that are scored, with `grasp`
+    /thenar/joints    names and angles of calibrated joints in rad, with `grasp`
     /thenar/preshape  the preshape, with `grasp`
     /thenar/health    once a second, if requested: the glove's health
 
@@ -12,25 +10,20 @@ frame. A topic without subscribers costs nothing. A reader's queue is bounded an
 stops delays nobody. The SDK's server runs on separate threads; readers can only request topics. A web page open in a
 browser of this machine may read as Foxglove does.
 
-Foxglove's schemas have no null, no alternatives and no references: None is left out of its message.
+Scores and switches are on the page of `--web`. Foxglove's schemas have no null, no alternatives and no references: None
+is left out of its message.
 """
 
 import re
-from math import exp
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 
 from thenar.drivers.extras import optional
 
-from ..frames import SwitchFrame
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind, SinkPlace
 from .sockets import check_readers, resolve
-
-if TYPE_CHECKING:
-    from ..build import Build
-    from ..live.recogniser import Moment
 
 _RATE_HZ = 50
 # Messages queued for one reader, over all topics: about two seconds.
@@ -39,24 +32,9 @@ BACKLOG = 512
 
 TOPICS: dict[str, type[msgspec.Struct]] = {
     "/thenar/grasp": LiveGrasp,
+    "/thenar/joints": JointAngles,
     "/thenar/preshape": Preshape,
     "/thenar/health": HealthReport,
-}
-# The details of a grasp: fields and their types; a list has the type of its items.
-DETAILS: dict[str, Any] = {
-    # Of every grasp type, in the build's order: the score in integer steps, and its softmax among all; and whether the
-    # build refuses the frame. None while too little can be read.
-    "/thenar/scores": {
-        "types": [{"grasp": "string", "score": "integer", "probability": "number"}],
-        "refused": "boolean",
-    },
-    # A switch that is in none of the lists is known to be open.
-    "/thenar/switches": {"closed": ["string"], "lost": ["string"]},
-    # Lists are empty without a calibration, or while the joints are lost.
-    "/thenar/joints": {
-        "angles": [{"name": "string", "position_rad": "number"}],
-        "codes": [{"name": "string", "code": "integer"}],
-    },
 }
 
 
@@ -66,15 +44,7 @@ def schemas() -> dict[str, dict[str, Any]]:
     for topic, kind in TOPICS.items():
         (whole,), shared = msgspec.json.schema_components((kind,), ref_template="{name}")
         found[topic] = {"title": f"thenar.{kind.__name__}", **_plain(whole, shared)}
-    return found | {topic: {"title": topic, **_described(fields)} for topic, fields in DETAILS.items()}
-
-
-def _described(fields: Any) -> dict[str, Any]:
-    if isinstance(fields, list):
-        return {"type": "array", "items": _described(fields[0])}
-    if isinstance(fields, dict):
-        return {"type": "object", "properties": {name: _described(field) for name, field in fields.items()}}
-    return {"type": fields}
+    return found
 
 
 def _plain(found: dict[str, Any], shared: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -92,9 +62,9 @@ def _plain(found: dict[str, Any], shared: dict[str, dict[str, Any]]) -> dict[str
     return {"type": found["type"]}
 
 
-def encode(content: msgspec.Struct | dict[str, Any]) -> bytes:
+def encode(content: msgspec.Struct) -> bytes:
     """Return a message: the fields that are not None."""
-    fields = content if isinstance(content, dict) else msgspec.structs.asdict(content)
+    fields = msgspec.structs.asdict(content)
     return msgspec.json.encode({name: value for name, value in fields.items() if value is not None})
 
 
@@ -129,30 +99,19 @@ class FoxgloveServer(Sink):
             raise SinkError(f"{self.where} cannot be opened: {said}{hint}") from None
         self.port: int = self._server.port
         self._unix_us = self._time_us = 0
-        self._build: Build | None = None
-
-    def begin(self, build: "Build") -> None:
-        """Take the names of switches, joints and grasp types."""
-        self._build = build
 
     def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish the grasp and the preshape."""
+        """Publish the grasp, the angles and the preshape."""
         self._time_us, self._unix_us = grasp.time_us, grasp.unix_us
-        self._log("/thenar/grasp", grasp)
-        if preshape is not None:
-            self._log("/thenar/preshape", preshape)
-
-    def moment(self, moment: "Moment") -> None:
-        """Publish the details with the grasp."""
-        for topic, made in (("/thenar/scores", _scores), ("/thenar/switches", _switches), ("/thenar/joints", _joints)):
-            if self._build is not None and self._channels[topic].has_sinks():
-                self._log(topic, made(moment, self._build))
+        for topic, content in (("grasp", grasp), ("joints", angles), ("preshape", preshape)):
+            if content is not None:
+                self._log(f"/thenar/{topic}", content)
 
     def health(self, report: HealthReport) -> None:
         """Publish the glove's health."""
         self._log("/thenar/health", report, report.time_us - self._time_us)
 
-    def _log(self, topic: str, content: msgspec.Struct | dict[str, Any], later_us: int = 0) -> None:
+    def _log(self, topic: str, content: msgspec.Struct, later_us: int = 0) -> None:
         """Pass a message to the server if its topic has readers, stamped `later_us` after the newest frame.
 
         The server does not report the messages that it drops for slow readers.
@@ -166,37 +125,6 @@ class FoxgloveServer(Sink):
         self._server.stop()
         for channel in self._channels.values():
             channel.close()
-
-
-def _scores(moment: "Moment", build: "Build") -> dict[str, Any]:
-    scores = moment.scores or ()
-    odds = [exp((score - max(scores)) / build.tables.scale) for score in scores]
-    types = [
-        {"grasp": grasp, "score": score, "probability": odd / sum(odds)}
-        for grasp, score, odd in zip(build.grasps, scores, odds, strict=False)
-    ]
-    return {"types": types, "refused": moment.refused}
-
-
-def _switches(moment: "Moment", build: "Build") -> dict[str, Any]:
-    frame = moment.switches or SwitchFrame(0, 0)
-    names = [switch.name for switch in build.manifest.switches]
-
-    def named(mask: int) -> tuple[str, ...]:
-        return tuple(name for bit, name in enumerate(names) if mask >> bit & 1)
-
-    return {"closed": named(frame.closed & ~frame.lost), "lost": named(frame.lost)}
-
-
-def _joints(moment: "Moment", build: "Build") -> dict[str, Any]:
-    angles, codes = moment.angles or JointAngles((), ()), map(int, moment.codes or ())
-    positions = zip(angles.names, angles.positions_rad, strict=True)
-    return {
-        "angles": [{"name": name, "position_rad": position} for name, position in positions],
-        "codes": [
-            {"name": joint.name, "code": code} for joint, code in zip(build.manifest.joints, codes, strict=False)
-        ],
-    }
 
 
 def _open(where: SinkPlace) -> Sink:

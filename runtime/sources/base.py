@@ -1,6 +1,5 @@
 """The interface of all sources: a device that is read in a separate thread, and reopened when it comes back."""
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
@@ -23,25 +22,6 @@ from ..taxels import Taxels
 SHORTEST_US = 10_000
 # Counts that say nothing of faults.
 _USUAL = {"transfers", "rows", "rows a second", "records"}
-
-
-class Pace:
-    """Limits the readings of a device to `rate_hz` a second."""
-
-    def __init__(self, rate_hz: float) -> None:
-        self._period_s, self._due_s = 1.0 / rate_hz, 0.0
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait until the next reading is due, but no longer than `timeout_s`; return whether it is."""
-        left_s = self._due_s - time.monotonic()
-        if left_s > 0.0:
-            time.sleep(min(left_s, timeout_s))
-        if left_s > timeout_s:
-            return False
-        now_s, next_s = time.monotonic(), self._due_s + self._period_s
-        # No reading makes up for a late one.
-        self._due_s = next_s if next_s > now_s else now_s + self._period_s
-        return True
 
 
 class Source(ABC):

@@ -1,5 +1,6 @@
 """I2C buses of a harness, their ports read in the order of a scan map."""
 
+import time
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 
@@ -9,49 +10,40 @@ from thenar.drivers.i2c.supervisor import PlacedChip, Route
 from thenar.drivers.spi.chips import SpiChip
 
 from ..frames import PERIODS, BitRemap, Mask, SwitchFrame, now_us
-from ..harness.wiring import Debounce, Harness
+from ..harness.wiring import Harness
 from ..published import Count
 from ..scanning.scanmap import SCHEMA, Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
 from ..taxels import TaxelCalibration, Taxels, calibration_of
-from .base import Pace, Source, SourceKind, debouncer_of, paced_us
+from .base import Source, SourceKind, debouncer_of, paced_us
 
 
-class PortSwitches:
-    """The switches of a port, debounced: `targets`, bits of its replies, some of them inverted."""
+class PortReader:
+    """The switches `targets` of a port, debounced: bits of its replies, some of them inverted, or levels of the taxel
+    that a conversion measures.
 
-    def __init__(self, port: Port, debounce: Debounce) -> None:
-        self._debouncer = debouncer_of(debounce)
-        self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
-        self._switches = BitRemap(port.switches)
-        self.targets = self._switches.targets
-
-    def states(self, reply: int | None) -> tuple[Mask, Mask]:
-        """Return the closed and the lost switches from a reply that came now; None: none came."""
-        if reply is None:
-            return 0, self.targets
-        closed = self._switches(reply ^ self._inverted)
-        return closed if self._debouncer is None else self._debouncer.update(now_us(), closed, self.targets), 0
-
-
-class PortLevels:
-    """Levels of the taxel that a conversion measures, debounced: `targets`, its name, its place among the harness's
-    taxels, and the comparison of its counts.
+    taxels, place  of a conversion: the comparison of its counts, and its taxel's place among the harness's
     """
 
     def __init__(self, port: Port, harness: Harness, calibration: TaxelCalibration | None) -> None:
         self._debouncer = debouncer_of(harness.debounce)
+        self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
+        self._switches = BitRemap(port.switches)
+        self.targets, self.taxels, self.place = self._switches.targets, None, -1
         wired = harness.chip_of(port.bus, port.chip)
-        channel = [reading.name for reading in wired.chip.readings].index(port.reading)
-        self.name = wired.numbered_pins[channel]
-        self.place = harness.taxel_names.index(self.name)
-        highest = wired.chip.highest if isinstance(wired.chip, Converter | SpiChip) else None
-        self.taxels = Taxels([self.name], [port.levels], calibration, highest)
-        self.targets = self.taxels.owned
+        if isinstance(wired.chip, Converter | SpiChip):
+            channel = [reading.name for reading in wired.chip.readings].index(port.reading)
+            name = wired.numbered_pins[channel]
+            self.place = harness.taxel_names.index(name)
+            self.taxels = Taxels([name], [port.levels], calibration, wired.chip.highest)
+            self.targets = self.taxels.owned
 
     def states(self, reply: int | None) -> tuple[Mask, Mask]:
         """Return the closed and the lost switches from a reply that came now; None: none came."""
-        closed, lost = self.taxels.read((reply,))
+        if self.taxels is not None:
+            closed, lost = self.taxels.read((reply,))
+        else:
+            closed, lost = (0, self.targets) if reply is None else (self._switches(reply ^ self._inverted), 0)
         if self._debouncer is None or reply is None:
             return closed, lost
         return self._debouncer.update(now_us(), closed, self.targets & ~lost) & ~lost, lost
@@ -62,15 +54,12 @@ class PortScanner(Source):
 
     def __init__(self, harness: Harness, bus: int, ports: Sequence[Port]) -> None:
         calibration, wiring = calibration_of(harness.taxel_settings), harness.line_of(bus)
-        self._ports = [
-            PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
-            for port in ports
-        ]
+        self._ports = [PortReader(port, harness, calibration) for port in ports]
         self.owned: Mask = sum(port.targets for port in self._ports)
-        self.taxels = tuple(port.taxels for port in self._ports if isinstance(port, PortLevels))
+        self.taxels = tuple(port.taxels for port in self._ports if port.taxels is not None)
         self._wire_us = scan_us(ScanMap(SCHEMA, tuple(ports)), harness).us
         self._everything = len(harness.taxel_names)
-        self._pace, self._held_up = Pace(wiring.rate_hz), 0
+        self._every_s, self._due_s, self._held_up = 1.0 / wiring.rate_hz, 0.0, 0
 
     @property
     def wire_us(self) -> float:
@@ -83,14 +72,20 @@ class PortScanner(Source):
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
         """Scan once, when it is due."""
-        if not self._pace.wait(timeout_s):
+        left_s = self._due_s - time.monotonic()
+        if left_s > 0.0:
+            time.sleep(min(left_s, timeout_s))
+        if left_s > timeout_s:
             return None
+        # No scan makes up for a late one.
+        now_s, next_s = time.monotonic(), self._due_s + self._every_s
+        self._due_s = next_s if next_s > now_s else now_s + self._every_s
         began_us, closed, lost = now_us(), 0, 0
         codes: list[int | None] = [None] * self._everything
         for port, reply in zip(self._ports, self.replies(), strict=True):
             shut, silent = port.states(reply)
             closed, lost = closed | shut, lost | silent
-            if isinstance(port, PortLevels):
+            if port.taxels is not None:
                 codes[port.place] = reply
         time_us = now_us()
         if time_us - began_us > self.longest_us:

@@ -13,7 +13,7 @@ import platform
 import re
 from collections.abc import Hashable, Iterator, Sequence
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.extras import optional
@@ -25,6 +25,12 @@ from .. import ros
 from ..frames import now_us
 from .rows import row_kinds
 
+if TYPE_CHECKING:
+    from ..ros_dds import DdsNode
+    from ..ros_rclpy import RclpyNode
+
+    Node = DdsNode | RclpyNode
+
 _JOINTS = "JointState"
 _ARRAYS = ("UInt8MultiArray", "Float32MultiArray")
 _TYPES = {_JOINTS: f"sensor_msgs/{_JOINTS}"} | {name: f"std_msgs/{name}" for name in _ARRAYS}
@@ -35,7 +41,7 @@ _NO_WHEEL = (
 )
 
 
-def open_node(where: str, *, public: bool) -> ros.Node:
+def open_node(where: str, *, public: bool) -> "Node":
     """Return a node in the domain of ROS_DOMAIN_ID. Raises SettingError if neither rclpy nor Cyclone DDS is installed,
     DeviceError if it cannot start.
     """
@@ -58,7 +64,7 @@ class RosReader(RowReader):
         self._port, self._counts = port, LineCounts()
         found = _PORT.fullmatch(port)
         self.kind = "joint" if found and (found[2] or _JOINTS) == _JOINTS else ""
-        self._node: ros.Node | None = None
+        self._node: Node | None = None
         self._read: ros.Read = lambda _timeout_s: []
         self._senders = FirstSender()
 

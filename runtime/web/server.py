@@ -51,6 +51,8 @@ _SEND_BUFFER = 65_536
 MOST_BYTES, MOST_PER_S, MOST_AT_ONCE = 16_384, 20.0, 40.0
 # Files that can be downloaded at the same time: a new one takes the place of the oldest.
 _MOST_OFFERED = 8
+# Replies that a page has not read, before it loses its place.
+MOST_UNREAD = 4 << 20
 _CLOSING_S = 0.5
 _ANY = {"0.0.0.0", "::"}
 
@@ -277,7 +279,7 @@ class Server(Closing):
 
     async def _listen(self, page: "_Page") -> None:
         async for came in page.socket:
-            if not page.may_speak(self._loop.time()):
+            if not page.may_speak(self._loop.time()) or page.transport.get_write_buffer_size() > MOST_UNREAD:
                 await page.close(WSCloseCode.POLICY_VIOLATION)
                 return
             if came.type is WSMsgType.PING and page.transport.get_write_buffer_size() == 0:

@@ -17,7 +17,6 @@ import msgspec
 import numpy as np
 
 from thenar.runtime.files import read_file, write_atomically
-from thenar.runtime.nesting import check_json
 
 from ..body.condition import Pad, PlannedGrasp, Thing
 from ..body.hand import Hand, Size
@@ -96,8 +95,10 @@ class Postures:
     @classmethod
     def decode(cls, content: bytes) -> Self:
         """Return the postures in the content of a file. Raises ValueError if it is invalid."""
-        check_json(content)
-        known = msgspec.json.decode(content, type=_File)
+        try:
+            known = msgspec.json.decode(content, type=_File)
+        except RecursionError as reason:
+            raise ValueError(str(reason)) from None
         return cls(known.taxonomy, known.entries)
 
     def save(self, path: Path) -> None:

@@ -115,7 +115,7 @@ def findings(full: bool) -> Iterator[Finding]:
 def fit(problem: Problem) -> FittedStumps:
     """Return our stump."""
     targets = Targets(problem.weights[np.newaxis], problem.responses[np.newaxis])
-    return fit_stumps(bin_columns(problem.X), targets, Z_MAX)
+    return fit_stumps([bin_columns(problem.X)], targets, Z_MAX)
 
 
 def thresholds_of(sets: Iterable[list[float]]) -> Finding:

@@ -174,7 +174,7 @@ function weakest({ confusion: counts }) {
   );
   if (!worst) return "none";
   const total = counts[worst.truth].reduce((sum, count) => sum + count, 0);
-  return `${set.grasps[worst.truth]} read as ${set.grasps[worst.read]}: ${worst.count} of ${total} trials`;
+  return `${set.grasps[worst.truth]} recognised as ${set.grasps[worst.read]}: ${worst.count} of ${total} trials`;
 }
 
 /** Show the accuracy that was measured for the chosen sensors, if it was. */

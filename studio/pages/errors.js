@@ -16,7 +16,7 @@ let drawn = null; // the message on the hand
 let reply = null; // what the recogniser makes of every trial
 let styles = new Map();
 let errors = []; // numbers of misread trials
-let at = -1; // the place among them of the one that is shown
+let last = -1; // the last of them that was shown
 let selected = []; // numbers of trials
 let asked = []; // of these, those of the last request
 
@@ -28,7 +28,9 @@ const map = new TrialMap($("map"), {
 const ask = openPage({
   open: () => set && look(),
   set: (message) => {
-    if (set?.numbering === message.numbering && set.grasps.join() === message.grasps?.join()) return;
+    if (set && set.numbering === message.numbering && set.why === message.why) return;
+    // Where a trial was left out, the next one has its number.
+    last -= 1;
     set = message;
     $("empty").hidden = !set.why;
     $("with-set").hidden = Boolean(set.why);
@@ -49,9 +51,9 @@ const ask = openPage({
     if (set && !set.why) list($("unused"), [...set.unused, ...(why ? [why] : [])]);
     if (set && !set.why) look();
   },
-  edits: ({ last }) => {
-    $("undo").disabled = !last;
-    say($("edited"), last && `Last edit: ${last}.`);
+  edits: ({ words }) => {
+    $("undo").disabled = !words;
+    say($("edited"), words && `Last edit: ${words}.`);
   },
   errors: (message) => {
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
@@ -192,6 +194,7 @@ function mark() {
   say($("relabel"), `Relabel ${count}`);
   say($("drop"), `Leave out ${count}`);
   const pair = pairOf(selected);
+  if (pair.length === 2) $("type").value = type(pair[1]);
   $("more").hidden = pair.length !== 2;
   if (pair.length !== 2) return;
   const query = new URLSearchParams({ types: pair.map(type).join(","), repetitions: 5 });
@@ -227,7 +230,7 @@ function card({ trial, shown, decisive }, typical) {
   const inputs = document.createElement("ul");
   list(inputs, decisive.map((sensor) => {
     const usual = [truth, read].map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");
-    return `${set.sensors[sensor].name} ${percent(shown[sensor])}; ${usual}`;
+    return `${set.sensors[sensor].name} ${percent(shown[sensor])} (${usual})`;
   }));
   made.append(label, verdict, ...hand(shown, decisive, set.trials[trial]), ...(decisive.length ? ["Decided by", inputs] : []));
   return made;
@@ -276,18 +279,16 @@ function whenSeen(element, draw) {
 
 function nextError(step) {
   if (!errors.length) return;
-  at = (Math.max(at, step < 0 ? 0 : -1) + step + errors.length) % errors.length;
-  select([errors[at]]);
+  const [after, before] = [errors.find((trial) => trial > last), errors.findLast((trial) => trial < last)];
+  last = step > 0 ? (after ?? errors[0]) : (before ?? errors.at(-1));
+  select([last]);
 }
 
 function edit(name) {
   ask("edit", { name, trials: chosen(), id: set.numbering });
 }
 
-$("of").addEventListener("change", () => {
-  at = -1;
-  look();
-});
+$("of").addEventListener("change", look);
 $("next").addEventListener("click", () => nextError(1));
 $("previous").addEventListener("click", () => nextError(-1));
 $("all-errors").addEventListener("click", () => select(errors));

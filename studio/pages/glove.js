@@ -109,10 +109,10 @@ function showState(message) {
   hand.setPose(message.values);
   message.states.forEach((state, sensor) => {
     if (state === states[sensor]) return;
-    for (const element of [spots[sensor], buttons[sensor]].filter(Boolean)) {
-      element.dataset.state = state;
-      element.setAttribute("aria-label", `${about.names[sensor]}: ${state}`);
-    }
+    const words = `${about.names[sensor]}: ${state}`;
+    for (const element of [spots[sensor], buttons[sensor]].filter(Boolean)) element.dataset.state = state;
+    spots[sensor]?.setAttribute("aria-label", words);
+    say(buttons[sensor], words);
   });
   states = message.states;
   const counts = ["ok", "stuck", "never seen", "lost"].map((state) => [states.filter((one) => one === state).length, state]);

@@ -83,7 +83,7 @@ export class TrialMap {
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     pen.clearRect(0, 0, wide, high);
-    const [text, page, bad] = ["--text", "--page", "--bad"].map((name) => colours.getPropertyValue(name));
+    const [text, page, bad, soft] = ["--text", "--page", "--bad", "--soft"].map((name) => colours.getPropertyValue(name));
     const circle = (x, y, radius) => {
       pen.beginPath();
       pen.arc(x, y, radius, 0, 2 * Math.PI);
@@ -93,6 +93,9 @@ export class TrialMap {
       circle(x, y, 3.5);
       pen.fillStyle = trial.colour;
       pen.fill();
+      pen.strokeStyle = soft;
+      pen.lineWidth = 0.5;
+      pen.stroke();
       if (!trial.wrong && !chosen) return;
       circle(x, y, chosen ? 8 : 5.5);
       pen.strokeStyle = chosen ? text : bad;

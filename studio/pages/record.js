@@ -14,6 +14,7 @@ let sensors = 0; // of the project's set, for Train
 let drawn = null; // the message on the glove's hand
 let hand = null;
 let pictured = null; // the grasp type that is drawn
+let listed = false; // whether the project has an objects.toml
 let edited = false; // whether the person's name was typed here
 
 const ask = openPage({
@@ -24,9 +25,11 @@ const ask = openPage({
     $("no-glove").hidden = glove;
     $("start").disabled = !glove;
     say($("objects"), objects ? "Objects are those of objects.toml." : "");
+    listed = objects;
     const before = $("taxonomy").value;
-    $("taxonomy").replaceChildren(...taxonomies.map((name) => new Option(name === "own" ? "own, of objects.toml" : name, name)));
-    $("taxonomy").value = taxonomies.includes(before) ? before : taxonomies.includes("own") ? "own" : taxonomies[0];
+    $("taxonomy").replaceChildren(...taxonomies.map((name) => new Option(name === "own" && objects ? "own, of objects.toml" : name, name)));
+    $("taxonomy").value = taxonomies.includes(before) ? before : objects ? "own" : taxonomies[0];
+    askTypes();
     $("unfinished").hidden = !unfinished.length;
     const items = unfinished.map(({ id, name, subject, done, total }) => {
       const item = document.createElement("li"), button = document.createElement("button");
@@ -77,6 +80,11 @@ const ask = openPage({
     if (why) say($("refused"), why);
   },
 });
+
+/** Ask for the person's own types, unless an objects.toml lists them. */
+function askTypes() {
+  $("own-types").hidden = $("taxonomy").value !== "own" || listed;
+}
 
 function show(state) {
   const { prompt, thing, standing, keys, done, total, skipped, number, grasp, waits } = state;
@@ -171,11 +179,13 @@ function accuracyWords(accuracy) {
 }
 
 $("subject").addEventListener("input", () => (edited = true));
+$("taxonomy").addEventListener("change", askTypes);
 $("form").addEventListener("submit", (event) => {
   event.preventDefault();
   ask("record", {
     name: $("subject").value.trim(),
     id: $("taxonomy").value,
+    names: $("own-types").hidden ? [] : $("types").value.split(",").map((name) => name.trim()),
     value: Number($("repetitions").value),
     trial: Number($("none").checked),
   });

@@ -15,10 +15,11 @@ import click
 import numpy as np
 import pytest
 
-from thenar.cli import collecting, run
+from thenar.cli import run
 from thenar.cli.group import COMMANDS, thenar
 from thenar.cli.parameters import OutputFile, OutputFolder
 from thenar.compiler import GraspSet
+from thenar.studio import collecting
 
 # Arguments and options of a small run of each command. Its devices are not there.
 LINES: dict[str, tuple[str, str]] = {

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import pytest
 from websockets.sync.client import ClientConnection, connect
@@ -252,3 +253,68 @@ def test_what_is_no_recording_is_refused(build_folder: Path, recording: Path, tm
     done = thenar("monitor", tmp_path / "other.mcap", "--build", build_folder)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
+
+
+@pytest.fixture
+def wired(tmp_path: Path) -> Path:
+    """Return a glove.toml in a folder for itself."""
+    path = tmp_path / "project" / "glove.toml"
+    path.parent.mkdir()
+    path.write_text(f'name = "bench"\n[[stream]]\nport = "{tmp_path}/none"\nswitches = ["a", "b"]\n')
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "title", "wearer"),
+    [
+        (("record", "--subject", "Anna", "--glove"), "record", "Anna"),
+        (("calibrate",), "glove", "me"),
+    ],
+)
+def test_a_page_leads_what_the_terminal_leads(
+    start: Callable[..., Command], wired: Path, words: tuple[str, ...], title: str, wearer: str
+) -> None:
+    command = start(*words, wired, "--web", "127.0.0.1:0")
+    with urlopen(command.url, timeout=PATIENCE_S) as page:
+        assert f"{title}.js" in page.read().decode()
+    with command.page() as live:
+        shell = told(live, "shell")
+        assert (shell["project"], shell["wearer"]) == ("project", wearer)
+        assert [name for _, name in shell["pages"]][:3] == ["Glove", "Record", "Choose"]
+    assert command.end() == 0
+    assert {path.name for path in wired.parent.iterdir()} <= {"glove.toml", "studio.json"}
+
+
+def test_the_studio_of_a_folder_without_recordings_begins_with_the_glove(
+    start: Callable[..., Command], wired: Path
+) -> None:
+    command = start("studio", wired.parent, "--web", "127.0.0.1:0")
+    with urlopen(command.url, timeout=PATIENCE_S) as page:
+        assert "glove.js" in page.read().decode()
+    assert command.end() == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("record", "--subject", "A", "--web", "--repetitions", "3", "--glove"),
+            "--repetitions has no effect with --web: choose it on the page: leave it out",
+        ),
+        (("record", "--subject", "A", "--glove"), "record on a page with --web"),
+        (("record", "--subject", "A", "-o", "a.grasps", "--web-token", "--glove"), "--web-token has no effect"),
+        (("calibrate", "--web", "-o", "a.toml"), "--output has no effect with --web"),
+        (("calibrate",), "calibrate on a page with --web"),
+    ],
+)
+def test_what_a_page_does_not_take_is_refused(wired: Path, words: tuple[str, ...], said: str) -> None:
+    done = thenar(*words, wired)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert said in done.stderr
+
+
+def test_a_glove_of_another_name_has_no_page(glove: Path, tmp_path: Path) -> None:
+    other = glove.rename(tmp_path / "mine.toml")
+    done = thenar("calibrate", other, "--web", "127.0.0.1:0")
+    assert done.returncode == 2
+    assert "is the glove.toml of a project, not mine.toml: rename it" in done.stderr

@@ -19,7 +19,7 @@ from thenar.compiler.firmware.words import numbered
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 from thenar.runtime.calibration import CodeTables, codes_of_bytes, numbers_of
-from thenar.runtime.code_line import FARTHEST, CodeLine, Point
+from thenar.runtime.code_line import FARTHEST, CodeLine
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
@@ -115,7 +115,7 @@ def joint(
 
 def in_python(sensor: Sensor, first: int, second: int, readings: range = READINGS) -> list[int]:
     """What the runtime makes of readings, where a sensor read these two at its points."""
-    line = CodeLine(Point(first, sensor.codes[0]), Point(second, sensor.codes[1]))
+    line = CodeLine((first, sensor.codes[0]), (second, sensor.codes[1]))
     return [line.code(reading) for reading in readings]
 
 

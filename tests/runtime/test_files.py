@@ -1,6 +1,4 @@
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -62,34 +60,3 @@ def test_the_file_has_the_rights_that_the_umask_gives(tmp_path: Path, monkeypatc
         monkeypatch.undo()
         os.umask(old)
     assert (tmp_path / "a.bin").stat().st_mode & 0o777 == 0o640
-
-
-# Stops where the temporary file is whole and the target not yet replaced.
-WRITER = """
-import os, signal, sys
-from pathlib import Path
-from thenar.runtime.files import write_atomically
-def stop(descriptor):
-    print("there", flush=True)
-    sys.stdin.read()
-os.fsync = stop
-write_atomically(Path(sys.argv[1]), b"theirs")
-"""
-
-
-def test_only_a_dead_writers_leftovers_are_deleted(tmp_path: Path) -> None:
-    path = tmp_path / "a.bin"
-    command = [sys.executable, "-c", WRITER, str(path)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:
-        assert writer.stdout is not None
-        assert writer.stdout.readline() == b"there\n"
-        write_atomically(path, b"ours")
-        assert len(list(tmp_path.iterdir())) == 2
-        writer.kill()
-    assert len(list(tmp_path.iterdir())) == 2
-    foreign = [tmp_path / name for name in (".a.bin.part", ".b.bin.01234567.part", "a.bin.01234567.part")]
-    for other in foreign:
-        other.write_bytes(b"")
-    write_atomically(path, b"new")
-    assert sorted(tmp_path.iterdir()) == sorted([path, *foreign])
-    assert path.read_bytes() == b"new"

@@ -126,8 +126,8 @@ def spoil_targets(patch: Patch) -> None:
 
 
 def spoil_stumpfits(patch: Patch) -> None:
-    def off(binned: Any, given: Targets, z_max: float) -> FittedStumps:
-        fitted = fit_stumps(binned, given, z_max)
+    def off(sets: Any, given: Targets, z_max: float) -> FittedStumps:
+        fitted = fit_stumps(sets, given, z_max)
         return replace(fitted, values=fitted.values * (1 + 2.0**-50))
 
     def one_row_turned(weights: np.ndarray, responses: np.ndarray) -> Targets:

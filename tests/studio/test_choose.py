@@ -5,6 +5,7 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -15,12 +16,16 @@ from selenium.webdriver.common.keys import Keys
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
+from thenar.cli import run
 from thenar.compiler.artifact.sensor_study import study_sensors
 from thenar.compiler.placement.constraints import Limits
+from thenar.compiler.recordings.edits import trials_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build
 from thenar.runtime.recipe import Recipe
-from thenar.studio import Studio
+from thenar.studio import Project, Studio
+from thenar.studio.edits import change
+from thenar.studio.studio import Report
 
 from ..browser import Browser
 from ..sets import grasp_set_of
@@ -62,11 +67,6 @@ def until(
 def counts(browser: Browser, number: int) -> None:
     """Wait until so many sensors are chosen, and the page has its answer."""
     browser.wait(lambda: browser.text("count") == f"{number} of 10")
-
-
-def heads(browser: Browser, mark: str) -> None:
-    """Wait until the trial of a mark on the map is shown."""
-    browser.wait(lambda: browser.text("trial-heading") == mark)
 
 
 def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio: Start, tmp_path: Path) -> None:
@@ -133,10 +133,11 @@ def test_a_double_click_adds_a_sensor_once(browser: Browser, studio: Start) -> N
     browser.open(studio().server.url)
     counts(browser, 0)
     browser.script("const add = document.getElementById('add'); add.click(); add.click(); add.click();")
-    # What is asked for later is answered later.
-    browser.script("document.querySelector('#map g').dispatchEvent(new MouseEvent('click'))")
-    browser.wait(lambda: browser.text("trial-heading"))
     counts(browser, 1)
+    rate = browser.text("rate")
+    browser.click("measure")
+    browser.wait(lambda: browser.text("measured"))
+    assert (browser.text("count"), browser.text("rate")) == ("1 of 10", rate)
     browser.click("drop")
     counts(browser, 0)
 
@@ -194,35 +195,6 @@ def test_work_that_the_machine_fails_is_told_and_ends_nothing(
     assert until(page, {"do": "measure", "sensors": [0]}, "measure", bool)["sensors"] == [0]
 
 
-def test_a_number_of_the_matrix_shows_its_trials(browser: Browser, studio: Start) -> None:
-    browser.open(studio().server.url)
-    counts(browser, 0)
-    browser.click("add")
-    counts(browser, 1)
-    cell = browser.driver.find_element(By.CSS_SELECTOR, "#confusion button")
-    said, count = str(cell.get_attribute("aria-label")), int(cell.text)
-    cell.click()
-    trials = browser.driver.find_elements(By.CSS_SELECTOR, "#trials button")
-    assert len(trials) == count
-    trials[0].click()
-    browser.wait(lambda: browser.driver.find_element(By.ID, "trial").is_displayed())
-    truth, read = said.partition(" trials of ")[2].split(" read as ")
-    assert browser.text("trial-heading").endswith(f": {truth}, read as {read}")
-    captions = browser.texts("#hands figcaption")
-    assert captions[1:] == [f"{truth}, typically", f"{read}, typically"]
-    assert len(browser.texts("#hands li")) == 3 * 2
-    assert browser.text("decisive").startswith("decided by ")
-    browser.wait(lambda: len(browser.texts("#map title")) == 72)
-    marks = browser.texts("#map title")
-    misread = [mark for mark in marks if "read as" in mark]
-    assert len(browser.texts("#map .ring")) == len(misread) == sum(map(int, browser.texts("#confusion button")))
-    browser.script("document.querySelector('#map g').dispatchEvent(new MouseEvent('click'))")
-    heads(browser, marks[0])
-    for mark in misread[:2]:
-        browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
-        heads(browser, mark)
-
-
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
 def test_nothing_keeps_people_out_and_a_phone_sees_all(
     browser: Browser, studio: Start, width: int, scheme: str
@@ -231,9 +203,9 @@ def test_nothing_keeps_people_out_and_a_phone_sees_all(
     counts(browser, 0)
     browser.click("add")
     counts(browser, 1)
-    browser.driver.find_element(By.CSS_SELECTOR, "#confusion button").click()
-    browser.driver.find_element(By.CSS_SELECTOR, "#trials button").click()
-    browser.wait(lambda: browser.driver.find_element(By.ID, "trial").is_displayed())
+    assert browser.axe() == []
+    browser.click("curve")
+    browser.wait(lambda: browser.texts("#points tr"))
     assert browser.axe() == []
     assert browser.script("return document.documentElement.scrollWidth <= innerWidth")
 
@@ -254,8 +226,8 @@ def test_two_browsers_do_not_move_each_other(studio: Start) -> None:
         ({"do": "train", "sensors": []}, "choose a sensor first"),
         ({"do": "choose", "sensors": ["../../etc/passwd"]}, "invalid message"),
         ({"do": "choose", "sensors": 1}, "invalid message"),
-        ({"do": "trial", "trial": 72}, "there are 72 trials"),
-        ({"do": "trial", "trial": 1e300}, "invalid message"),
+        ({"do": "use", "id": "../other"}, "the project has no set"),
+        ({"do": "choose", "sensors": [1e300]}, "invalid message"),
         ({"do": "quit"}, "a page cannot 'quit'"),
     ],
 )
@@ -297,3 +269,112 @@ def test_an_empty_project_says_what_to_do(browser: Browser, studio: Start) -> No
     browser.wait(lambda: "record some" in browser.text("empty"))
     assert not browser.driver.find_element(By.ID, "with-set").is_displayed()
     assert browser.axe() == []
+
+
+def test_sets_are_used_left_aside_and_said_not_to_fit(
+    browser: Browser, studio: Start, people: GraspSet, tmp_path: Path
+) -> None:
+    folder = tmp_path / "recorded"
+    folder.mkdir()
+    replace(people, subjects=np.char.add(people.subjects, "2")).save(folder / "more.grasps")
+    replace(people, joints=(), codes=np.zeros((72, 0), np.uint16)).save(folder / "other glove.grasps")
+    (folder / "torn.grasps").write_bytes(b"THNR")
+    opened = studio()
+    browser.open(opened.server.url)
+    counts(browser, 0)
+    assert browser.texts("#sets label") == ["more.grasps", "other glove.grasps", "set.grasps", "torn.grasps"]
+    left = browser.texts("#unused li")
+    assert len(left) == 2
+    assert left[0].startswith("torn.grasps is left aside: ")
+    assert left[1].startswith("other glove.grasps is left aside: other glove.grasps lacks 2 joints")
+    browser.click("add")
+    counts(browser, 1)
+    command = browser.text("command")
+    merged = f"{tmp_path}/recorded.grasps"
+    sets = f"{folder}/more.grasps {folder}/set.grasps"
+    assert command.startswith(f"thenar merge {sets} -o {merged} && thenar compile {merged} -o ")
+    boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#sets input")
+    for name in (1, 0, 3):
+        boxes[name].send_keys(Keys.SPACE)
+    browser.wait(lambda: not browser.texts("#unused li"))
+    browser.wait(lambda: browser.text("command").startswith(f"thenar compile {folder}/set.grasps -o "))
+    counts(browser, 1)
+    assert Project(folder, opened.project.hand()).state.aside == ("more.grasps", "other glove.grasps", "torn.grasps")
+    assert browser.axe() == []
+
+
+def test_the_command_applies_the_edits_and_can_be_run(studio: Start, people: GraspSet, tmp_path: Path) -> None:
+    """The shell's words make the set that the page trains on."""
+    opened, folder = studio(), tmp_path / "recorded"
+    change(folder / "edits.jsonl", trials_of("set.grasps", people)[:5], "")
+    opened.changed()
+    command = until(opened, {"do": "choose", "sensors": [0, 8]}, "quick", lambda quick: "merge" in quick["command"])
+    merge, compiled = command["command"].split(" && ")
+    sets = f"{folder}/set.grasps --edits {folder}/edits.jsonl"
+    assert merge == f"thenar merge {sets} -o {tmp_path}/recorded.grasps"
+    assert compiled.startswith(f"thenar compile {tmp_path}/recorded.grasps -o {folder}/build ")
+    assert run(merge.split()[1:]) == 0
+    clean = GraspSet.load(tmp_path / "recorded.grasps")
+    assert (
+        clean.fingerprint() == opened.project.grasp_set().fingerprint() == people.rows(np.arange(5, 72)).fingerprint()
+    )
+
+
+def test_a_point_of_the_front_says_what_it_is_and_is_chosen(browser: Browser, studio: Start) -> None:
+    """By mouse and by keyboard."""
+    browser.open(studio().server.url)
+    counts(browser, 0)
+    browser.click("curve")
+    browser.wait(lambda: browser.texts("#points tr"))
+    points = browser.driver.find_elements(By.CSS_SELECTOR, "#front .point")
+    rows = browser.texts("#points td:nth-of-type(1)")
+    assert len(points) == len(rows)
+    points[2].click()
+    browser.wait(lambda: browser.text("point-heading").startswith("3 sensors: "))
+    mean, _, ends = rows[2].partition(" ")
+    assert browser.text("point-heading").startswith(f"3 sensors: {mean} % {ends}, new subject")
+    points[3].send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.text("point-heading").startswith("4 sensors: "))
+    assert points[3].get_attribute("aria-pressed") == "true"
+    assert browser.texts("#points td:nth-of-type(2)")[3] in browser.text("point-about")
+    names = browser.text("point-sensors").split(", ")
+    browser.driver.find_element(By.ID, "point-choose").send_keys(Keys.ENTER)
+    counts(browser, 4)
+    assert {*browser.text("command").rpartition(" ")[2].split(",")} == {*names}
+
+
+def test_work_says_how_long_it_takes_still_and_is_cancelled(browser: Browser, studio: Start, tmp_path: Path) -> None:
+    """As long as the last time at first, which counts down, and then as its parts took so far."""
+    opened = studio()
+    browser.open(opened.server.url)
+    counts(browser, 0)
+    first, second = Event(), Event()
+
+    def work(report: Report) -> None:
+        assert first.wait(PATIENCE_S)
+        report(1, 4)
+        assert second.wait(PATIENCE_S)
+        report(2, 4)
+        raise AssertionError("it was cancelled")
+
+    opened.project.remember(took={"measure": 1000.0, "curve": 40.0})
+    opened.changed()
+    browser.wait(lambda: browser.text("times") == "Last time, measuring took 17 min, measuring the curve took 40 s.")
+    opened.queue("curve", work)
+    browser.wait(lambda: browser.text("work") == "measuring the curve: 0 %, about 40 s left")
+    browser.wait(lambda: browser.text("work") == "measuring the curve: 0 %, about 35 s left")
+    first.set()
+    browser.wait(lambda: browser.text("work").startswith("measuring the curve: 25 %, about "))
+    assert "about 35 s" not in browser.text("work")
+    browser.click("cancel")
+    # What is asked for later is answered later.
+    browser.click("add")
+    counts(browser, 1)
+    second.set()
+    browser.wait(lambda: browser.text("work") == "cancelled")
+    assert not browser.driver.find_element(By.ID, "cancel").is_displayed()
+    remembered = Project(tmp_path / "recorded", opened.project.hand())
+    assert remembered.state.took == {"measure": 1000.0, "curve": 40.0}
+    browser.click("curve")
+    browser.wait(lambda: browser.texts("#points tr"))
+    browser.wait(lambda: "measuring the curve took 40 s" not in browser.text("times"))

@@ -61,8 +61,7 @@ def open_glove(browser: Browser, studio: Studio, **how: int | str) -> None:
 
 def states(browser: Browser) -> dict[str, str]:
     """Return the state of each sensor, as the list says it."""
-    said = browser.script("return [...document.querySelectorAll('#sensors button')].map((one) => one.ariaLabel ?? '')")
-    return dict(one.split(": ") for one in said if one)
+    return dict(said.split(": ") for said in browser.texts("#sensors button") if ": " in said)
 
 
 def toggle(browser: Browser, board: BoardSender, *names: str) -> None:
@@ -105,7 +104,7 @@ def test_a_stuck_a_silent_and_a_lost_sensor_are_told_apart(
     assert browser.axe() == []
     line.close()
     browser.wait(lambda: {*states(browser).values()} == {"lost"})
-    assert "check its cable" in browser.text("problem")
+    browser.wait(lambda: "check its cable" in browser.text("problem"))
     assert browser.script("return document.getElementById('glove-state').dataset.is") == "bad"
     assert browser.axe() == []
 

@@ -6,12 +6,6 @@ from .mcp23017 import NOT_AN_INPUT, OPEN_DRAIN, Mcp230xxModel
 _IODIR, _IOCON, _GPIO, _OLAT = 0x00, 0x05, 0x09, 0x0A
 
 
-class Mcp23008Model(Mcp230xxModel):
-    """One port, registers 00 to 0A."""
-
-    pins = 8
-
-
 class Mcp23008(Chip):
     """Eight pins, GP0 to GP7. SCL up to 1.7 MHz at 4.5 V, 400 kHz at 2.7 V, 100 kHz at 1.8 V."""
 
@@ -23,7 +17,7 @@ class Mcp23008(Chip):
     pins = tuple(f"GP{bit}" for bit in range(8))
     not_inputs = {"GP7": NOT_AN_INPUT}  # noqa: RUF012
     readings = (Reading("GPIO", bytes((_GPIO,)), byte_pins(0), high=0x80),)
-    model = Mcp23008Model
+    model = Mcp230xxModel
     package = ChipPackage(
         part="MCP23008-E/SO",
         maker="Microchip",

@@ -14,8 +14,12 @@ NOT_AN_INPUT = (
 
 
 class Mcp230xxModel(RegisterModel):
-    """Registers with an automatically incremented pointer; pins without pull-up float, and read 0 here."""
+    """Registers with an automatically incremented pointer; pins without pull-up float, and read 0 here.
 
+    It is an MCP23008, with one port, and registers 00 to 0A.
+    """
+
+    pins = 8
     _INPUTS, _POLARITY, _CONTROL, _PULL_UPS, _FLAGS, _CAPTURE, _PINS, _LATCH = 0, 1, 5, 6, 7, 8, 9, 10
     _REGISTERS = 11
 

@@ -1,7 +1,5 @@
 """NXP PCA9555 and TI TCA9555: two ports of eight pins with pull-ups of 100 kohm, in pairs of registers."""
 
-from typing import ClassVar
-
 from .base import TSSOP24, Chip, ChipPackage, Reading, RegisterModel, Write, byte_pins, pins_of_24, port_pins
 
 _INPUT_0, _INPUT_1, _OUTPUT, _POLARITY, _CONFIGURATION = 0, 1, 2, 4, 6
@@ -11,10 +9,15 @@ _SIGNATURE = b"\xaa\x55"
 
 
 class BankedModel(RegisterModel):
-    """Banks of inputs, outputs, polarities and configurations, `stride` registers apart; pins as driven externally."""
+    """Banks of inputs, outputs, polarities and configurations, `stride` registers apart; pins as driven externally.
 
-    _ports: ClassVar[int]
-    _stride: ClassVar[int]
+    It is a PCA9555: pairs of registers 0 to 7, whose next byte belongs to the other register of the pair.
+    """
+
+    pins, _ports, _stride = 16, 2, 2
+
+    def _point(self, byte: int) -> None:
+        self._pointer = byte & 7
 
     def reset(self) -> None:
         """Reset to the state after power-on."""
@@ -44,15 +47,6 @@ class BankedModel(RegisterModel):
         return (self.port(port) & inputs | self._outputs[port] & ~inputs & 0xFF) ^ self._polarities[port]
 
 
-class Pca9555Model(BankedModel):
-    """Pairs of registers 0 to 7; the next byte belongs to the other register of the pair."""
-
-    pins, _ports, _stride = 16, 2, 2
-
-    def _point(self, byte: int) -> None:
-        self._pointer = byte & 7
-
-
 class Pca9555(Chip):
     """Pins P00 to P07 and P10 to P17. SCL up to 400 kHz. Bytes alternate between the two ports."""
 
@@ -66,7 +60,7 @@ class Pca9555(Chip):
         Reading("1", bytes((_INPUT_1,)), byte_pins(1)),
         Reading("01", bytes((_INPUT_0,)), byte_pins(0, 1)),
     )
-    model = Pca9555Model
+    model = BankedModel
     package = ChipPackage("PCA9555PW,118", "NXP", "PCA9555PW", TSSOP24, pins_of_24("VSS", "VDD"))
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:

@@ -10,9 +10,10 @@ _DOUBT = "the body's width (7.5 mm) is not confirmed: some sellers' parts have 3
 class LatchedModel(Device):
     """A latch for every eight pins and no registers; bytes go to the latches by turns, from the first after a START.
 
-    A pin is high if both its latch and its external level are.
+    A pin is high if both its latch and its external level are. It is a PCF8574 with one latch.
     """
 
+    pins = 8
     has_registers = False
 
     def reset(self) -> None:
@@ -30,12 +31,6 @@ class LatchedModel(Device):
         return bytes(self._latches[port] & self.port(port) for port in ports)
 
 
-class Pcf8574Model(LatchedModel):
-    """One latch."""
-
-    pins = 8
-
-
 class Pcf8574(Chip):
     """Eight pins, P0 to P7, each with a current source of about 100 uA to the supply. SCL up to 100 kHz.
 
@@ -50,7 +45,7 @@ class Pcf8574(Chip):
     pins = tuple(f"P{bit}" for bit in range(8))
     readings = (Reading("P", b"", byte_pins(0)),)
     registers = False
-    model = Pcf8574Model
+    model = LatchedModel
     package = ChipPackage("PCF8574T/3,518", "NXP", "PCF8574", _SOIC16, _PINS, sure=False, note=_DOUBT)
 
     def setup(self, used: frozenset[int]) -> tuple[Write, ...]:

@@ -179,12 +179,5 @@ def less_last(rows: Rows) -> Rows:
     return relative
 
 
-class Kinds(Members[type[Term]]):
-    """The kinds of terms by name: members are classes."""
-
-    def unfit(self, member: object) -> str:
-        """Return why something is no kind of term; "" if it is one."""
-        return "" if isinstance(member, type) and issubclass(member, Term) else "is not a class derived from Term"
-
-
-TERMS = Kinds("kind of term", type, "thenar.runtime.model.terms", "thenar.terms")
+# The kinds of terms by name: members are classes.
+TERMS: Members[type[Term]] = Members("kind of term", type, "thenar.runtime.model.terms", "thenar.terms", base=Term)

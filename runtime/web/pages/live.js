@@ -33,6 +33,7 @@ const ask = openPage({
   overview: (overview) => replay.overview(overview),
   moments: (moments) => replay.moments(moments),
   project: (project) => steer((page) => page.project(project)),
+  live: (commands) => steer((page) => page.commands(commands)),
   station: (station) => steer((page) => page.station(station)),
 });
 

@@ -121,7 +121,7 @@ export class Timeline {
 
   /** Take the names of the types, which have colours. */
   types(names) {
-    this.#styles = typeStyles(names);
+    this.#styles = typeStyles([...names, "none", "unknown"]);
   }
 
   /** Take a moment of a run. */

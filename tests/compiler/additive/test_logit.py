@@ -22,7 +22,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def numbers(tables: ColumnTables) -> bytes:
-    slopes = (tables.lines[column].row for column in sorted(tables.lines))
+    slopes = (tables.lines[column][2] for column in sorted(tables.lines))
     return b"".join(part.tobytes() for part in (tables.bias, *tables.edges, *tables.rows, *slopes))
 
 
@@ -193,7 +193,7 @@ def test_sparse_lines_are_the_best_of_all_with_these_weights_zero(seed: int, spa
     X, labels = grasps(seed, joints=5)
     own: dict[str, Any] = {"penalty": 1.0, "smoothness": 1.0, "linear": True, "tolerance": 1e-10}
     tables, dense = fit_logit(X, labels, 3, **own, sparsity=sparsity), fit_logit(X, labels, 3, **own)
-    found, whole = (np.stack([each.lines[6 + joint].row for joint in range(5)]) for each in (tables, dense))
+    found, whole = (np.stack([each.lines[6 + joint][2] for joint in range(5)]) for each in (tables, dense))
     assert not found[:, -1].any()
     assert np.count_nonzero(found == 0) == 5 + round(sparsity * 10)
     sizes = np.abs(whole[:, :-1] - whole[:, -1:]) * X[:, 6:].std(axis=0)[:, np.newaxis]

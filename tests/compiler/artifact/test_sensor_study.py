@@ -1,5 +1,7 @@
 """What sensors are worth: measured in folds, the same on any number of cores, and what a build then keeps."""
 
+import re
+import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
 
@@ -89,6 +91,13 @@ def test_a_study_is_drawn_the_same_each_time_and_a_dollar_is_a_dollar() -> None:
     pictures = [draw_curve(study, hand, kind) for kind in ("svg", "svg", "png", "png")]
     assert pictures[0] == pictures[1]
     assert pictures[2] == pictures[3]
+    text = pictures[0].decode()
+    root = ElementTree.fromstring(text)
+    assert {"width", "height"}.isdisjoint(root.attrib)
+    sizes = [100 * float(scale) for scale in re.findall(r"scale\((\d*\.\d+) -", text)]
+    assert min(sizes) * 400 / float(root.attrib["viewBox"].split()[2]) >= 11
+    numbers = [str(number) for number, row in enumerate(study.chosen, 1) if hand.knows([row.name])]
+    assert [words for words in re.findall(r"<!-- (\d+) -->", text) if words in numbers][-len(numbers) :] == numbers
     with pytest.raises(PictureError, match=r"ends in \.png or \.svg, not in \.pdf"):
         draw_curve(study, None, "pdf")
 

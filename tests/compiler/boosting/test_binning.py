@@ -52,13 +52,20 @@ def test_every_split_of_every_varying_column_is_summed(X: np.ndarray) -> None:
 
 def test_batches_of_columns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(binning, "_BATCH_ELEMENTS", 30)
+    monkeypatch.setattr(binning, "_DENSE_PRODUCTS", 300)
     check_all_sums(np.random.default_rng(7).integers(0, 9, size=(40, 11)).astype(np.float64))
+    check_all_sums(np.random.default_rng(7).integers(0, 2, size=(40, 11)).astype(np.float64))
+    monkeypatch.setattr(binning, "_DENSE_ROWS", 0)
     check_all_sums(np.random.default_rng(7).integers(0, 2, size=(40, 11)).astype(np.float64))
 
 
 @pytest.mark.parametrize("columns", [1, 7, 8, 9, 21])
 @pytest.mark.parametrize("rows", [3, 40, 700])
-def test_columns_of_two_values_that_share_cells_are_summed_apart(rows: int, columns: int) -> None:
+@pytest.mark.parametrize("dense", [0, 700])
+def test_columns_of_two_values_that_share_cells_are_summed_apart(
+    rows: int, columns: int, dense: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(binning, "_DENSE_ROWS", dense)
     X = np.random.default_rng(columns).integers(0, 2, size=(rows, columns))
     X[:2] = [[0], [1]]
     check_all_sums(X.astype(np.float64))

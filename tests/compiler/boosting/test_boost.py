@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.elementary import softmax, softmax_and_loss
 from thenar.compiler.samples import TrainingError
-from thenar.compiler.trainers.logitboost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, boost
+from thenar.compiler.trainers.logitboost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, boost, boost_together
 from thenar.runtime.model.tables import winners
 
 from ..conftest import grasps
@@ -164,6 +164,22 @@ def test_every_loss_is_the_loss_of_the_scores_after_that_round(weighted: bool) -
     stages = [np.zeros((len(X), 3)), *stumps.staged_scores(X)]
     # Bit for bit: what trains and what scores adds the same numbers in the same order.
     assert losses == tuple(softmax_and_loss(scores.T, labels, weights)[1] for scores in stages)
+
+
+@given(st.integers(0, 2**32))
+@settings(max_examples=25, deadline=None)
+def test_sets_that_are_trained_together_learn_what_each_learns_alone(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    sets = [grasps(seed + number, bits=rng.integers(1, 7), joints=rng.integers(0, 3)) for number in range(4)]
+    lacking = sets[1][0].astype(np.float64)
+    lacking[rng.random(lacking.shape) < 0.2] = np.nan
+    sets[1] = lacking, sets[1][1]
+    options: dict[str, Any] = {"rounds": 20, "shrinkage": 0.7, "max_bins": 4 if seed % 2 else None}
+    for (X, labels), together in zip(sets, boost_together(sets, 3, **options), strict=True):
+        alone, _ = boost(X, labels, 3, **options)
+        assert np.array_equal(together.columns, alone.columns)
+        assert np.array_equal(together.thresholds, alone.thresholds)
+        assert np.array_equal(together.values, alone.values)
 
 
 def test_the_default_is_a_hundred_rounds_each_reported() -> None:

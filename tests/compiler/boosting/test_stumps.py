@@ -42,7 +42,7 @@ def test_no_other_stump_explains_more(problem: tuple[np.ndarray, np.ndarray, np.
     binned = bin_columns(X)
     if not binned.columns or weights.max() < 1e-6:
         return
-    fitted = fit_stumps(binned, Targets(weights, responses), Z_MAX)
+    fitted = fit_stumps([binned], Targets(weights, responses), Z_MAX)
     w = [Fraction(float(v)) for v in weights[0]]
     r = [Fraction(float(v)) for v in responses[0]]
     stumps = [
@@ -68,7 +68,7 @@ def test_values_are_weighted_means_within_the_clamp(problem: tuple[np.ndarray, n
     binned = bin_columns(X)
     if not binned.columns or weights.max() < 1e-6:
         return
-    fitted = fit_stumps(binned, Targets(weights, responses), Z_MAX)
+    fitted = fit_stumps([binned], Targets(weights, responses), Z_MAX)
     assert (np.abs(fitted.values) <= Z_MAX).all()
     numbers = X[:, fitted.columns[0]]
     branches = (numbers <= fitted.thresholds[0], numbers > fitted.thresholds[0], np.isnan(numbers))
@@ -84,7 +84,8 @@ def test_values_are_weighted_means_within_the_clamp(problem: tuple[np.ndarray, n
 
 def test_a_nearly_weightless_branch_predicts_the_mean() -> None:
     X = np.array([[0.0], [1.0], [1.0]])
-    fitted = fit_stumps(bin_columns(X), Targets(np.array([[1e-17, 0.5, 0.5]]), np.array([[-3e-17, 0.5, 0.75]])), Z_MAX)
+    targets = Targets(np.array([[1e-17, 0.5, 0.5]]), np.array([[-3e-17, 0.5, 0.75]]))
+    fitted = fit_stumps([bin_columns(X)], targets, Z_MAX)
     np.testing.assert_allclose(fitted.values, [[1.25, 1.25, 1.25]], rtol=1e-12)
 
 
@@ -104,7 +105,7 @@ def test_columns_of_equal_sums_tie_however_the_grid_rounds_them() -> None:
     for seed in range(40):
         branches, weights, responses = _equal_sums(seed)
         for columns in (branches.T, branches[::-1].T):
-            fitted = fit_stumps(bin_columns(columns), Targets(weights, responses), Z_MAX)
+            fitted = fit_stumps([bin_columns(columns)], Targets(weights, responses), Z_MAX)
             assert fitted.columns[0] == 0, seed
 
 
@@ -112,7 +113,7 @@ def test_splits_of_equal_sums_tie_and_the_lowest_wins() -> None:
     for seed in range(40):
         (first, others), weights, responses = _equal_sums(seed)
         for column in (1 + first - others, 1 - first + others):
-            fitted = fit_stumps(bin_columns(column[:, np.newaxis]), Targets(weights, responses), Z_MAX)
+            fitted = fit_stumps([bin_columns(column[:, np.newaxis])], Targets(weights, responses), Z_MAX)
             assert fitted.thresholds[0] == 0.5, seed
 
 
@@ -140,7 +141,7 @@ def test_a_branch_of_exactly_the_least_share_is_not_empty(bits: int, value: floa
     share = 2.0**-bits
     weights = np.array([[share, 0.5 - share, 0.5]])
     targets = Targets(weights, weights * [[2.0, -1.0, -1.0]])
-    fitted = fit_stumps(bin_columns(np.array([[0.0], [1.0], [1.0]])), targets, Z_MAX)
+    fitted = fit_stumps([bin_columns(np.array([[0.0], [1.0], [1.0]]))], targets, Z_MAX)
     # An empty one answers with the mean of all, which is next to -1.
     assert fitted.values[0, 0] == pytest.approx(value, abs=1e-9)
 
@@ -149,7 +150,7 @@ def test_a_branch_of_exactly_the_least_share_is_not_empty(bits: int, value: floa
 def test_a_class_without_weight_answers_nothing_and_harms_no_other(responses: float) -> None:
     weights = np.array([[0.25, 0.25, 0.5], [0.0, 0.0, 0.0]])
     targets = Targets(weights, np.array([[0.25, 0.25, -0.5], [responses, 0.0, responses]]))
-    fitted = fit_stumps(bin_columns(np.array([[0.0], [0.0], [1.0]])), targets, Z_MAX)
+    fitted = fit_stumps([bin_columns(np.array([[0.0], [0.0], [1.0]]))], targets, Z_MAX)
     assert fitted.values.tolist() == [[1.0, -1.0, 0.0], [0.0, 0.0, 0.0]]
 
 
@@ -172,5 +173,5 @@ def test_inputs_of_another_shape_are_not_scored(shape: tuple[int, ...]) -> None:
 @pytest.mark.parametrize("thresholds", [1, 3])
 def test_arrays_of_rounds_that_do_not_agree_are_not_scored(thresholds: int) -> None:
     stumps = Stumps(4, np.zeros((2, 2), np.int32), np.zeros((thresholds, 2)), np.zeros((2, 2, 3)), 1.0)
-    with pytest.raises(ValueError, match="zip"):
+    with pytest.raises(ValueError, match="different numbers of rounds"):
         stumps.scores(np.zeros((5, 4)))

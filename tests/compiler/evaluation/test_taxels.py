@@ -51,9 +51,9 @@ def test_a_fold_is_predicted_by_the_levels_of_its_training_rows(padded: GraspSet
         assert len(every) > 9
         elements = tuple(element for element in every if element.column in columns)
         same = tuple(map(Element, range(len(elements))))
-        found = predictions(Samples.of(padded), FoldFit(fold, elements, (0,), population.grasps), TRAINING)
+        found = predictions(Samples.of(padded), [FoldFit(fold, elements, (0,), population.grasps)], TRAINING)
         plain = Samples.of(plain_by(padded, elements))
-        assert np.array_equal(found, predictions(plain, FoldFit(fold, same, (0,), population.grasps), TRAINING))
+        assert np.array_equal(found, predictions(plain, [FoldFit(fold, same, (0,), population.grasps)], TRAINING))
 
 
 def test_choices_made_together_are_those_of_each_recipe_alone(padded: GraspSet) -> None:

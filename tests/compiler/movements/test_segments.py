@@ -17,8 +17,8 @@ from thenar.compiler.movements.segments import (
     segments_of,
 )
 from thenar.compiler.movements.streams import streams_of
-from thenar.runtime.segmenting.decoder import decode, emissions
-from thenar.runtime.segmenting.model import STEPS
+from thenar.runtime.errors import BuildError
+from thenar.runtime.segmenting.model import STEPS, SegmentModel
 
 from .conftest import make_movements
 
@@ -163,6 +163,12 @@ def test_a_model_that_was_learnt_finds_segments_in_unsure_scores() -> None:
     assert again == model
 
 
+def test_scores_of_other_classes_are_refused() -> None:
+    model = SegmentModel.usual(3, True, 100.0)
+    with pytest.raises(BuildError, match=r"scores have shape \(2, 3\), but the segment model takes 4 a frame"):
+        live_states(model, np.zeros((2, 3), int), 1)
+
+
 @pytest.mark.parametrize("lag", [0, 1, 15, 10_000])
 def test_live_states_are_one_a_tick_and_at_last_the_offline_ones(lag: int) -> None:
     grasp_set = make_movements("A")
@@ -170,5 +176,5 @@ def test_live_states_are_one_a_tick_and_at_last_the_offline_ones(lag: int) -> No
     lanes = np.rint(100 * unsure(grasp_set.labels, 3)).astype(np.int64)
     states = live_states(model, lanes, lag)
     assert len(states) == len(lanes)
-    offline = decode(model, emissions(lanes, model))
+    offline = live_states(model, lanes, len(lanes))
     assert states.tolist() == offline.tolist() if lag == 10_000 else states[-1] == offline[-1]

@@ -48,14 +48,8 @@ def test_what_foxglove_reads_is_what_the_run_published_and_both_end_together(run
         rounded = {name: round(value, 4) if isinstance(value, float) else value for name, value in content.items()}
         assert rounded == {name: line[name] for name in content}
         assert time_ns == 1000 * content["unix_us"]
-    at = {time_ns: content["candidate"] for time_ns, content in came["/thenar/grasp"]}
-    scored = [(at[time_ns], scores["types"]) for time_ns, scores in came["/thenar/scores"] if time_ns in at]
-    assert len(scored) > 10
-    assert all(max(types, key=lambda one: one["score"])["grasp"] == best for best, types in scored)
-    closed = [set(content["closed"]) for _, content in came["/thenar/switches"]]
-    for row in (5, 9, 13):
-        assert {name for name, shut in zip(truth.switch_names, truth.bits[row], strict=True) if shut} in closed
-    assert came["/thenar/joints"][-1][1]["angles"]
+    assert len(came["/thenar/joints"]) > 10
+    assert came["/thenar/joints"][-1][1]["positions_rad"]
     reports = [{**decode(encode(report)), "kind": None} for report in client.reports]
     assert came["/thenar/health"]
     assert all({**content, "kind": None} in reports for _, content in came["/thenar/health"])

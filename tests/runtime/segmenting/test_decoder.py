@@ -10,10 +10,23 @@ from hypothesis.strategies import DrawFn
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.segmenting.decoder import Decoder, decode, emissions
+from thenar.runtime.segmenting.decoder import Decoder
 from thenar.runtime.segmenting.model import SegmentModel
 
 Segments = list[tuple[int, int]]
+
+
+def costs_of(model: SegmentModel, lanes: NDArray[np.int64], refused: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the costs of frames, (T, K + 1)."""
+    return np.array([model.costs(row, no) for row, no in zip(lanes.tolist(), refused.tolist(), strict=True)])
+
+
+def decoded(model: SegmentModel, lanes: NDArray[np.int64], refused: NDArray[np.bool_]) -> list[int]:
+    """Return the states of the cheapest segmentation of a whole stream."""
+    decoder = Decoder(model, len(lanes))
+    for row, no in zip(lanes.tolist(), refused.tolist(), strict=True):
+        decoder.push(row, no)
+    return decoder.finish()
 
 
 @st.composite
@@ -85,8 +98,7 @@ def test_segmentation_has_the_least_cost_with_documented_ties(
     stream: tuple[SegmentModel, NDArray[np.int64], NDArray[np.bool_]],
 ) -> None:
     model, lanes, refused = stream
-    costs = emissions(lanes, model, refused)
-    assert tuple(decode(model, costs)) == _best(model, costs)[1]
+    assert tuple(decoded(model, lanes, refused)) == _best(model, costs_of(model, lanes, refused))[1]
 
 
 def test_of_the_cheapest_segmentations_of_tiny_streams_the_documented_one_wins() -> None:
@@ -100,8 +112,8 @@ def test_of_the_cheapest_segmentations_of_tiny_streams_the_documented_one_wins()
         model = SegmentModel(
             shift=0, gain=256, most=1, least=least, stay=costs(4), enter=costs(3), leave=costs(3), direct=costs(3)
         )
-        lanes = random.integers(0, 2, (4, 4))
-        assert tuple(decode(model, emissions(lanes, model))) == _best(model, emissions(lanes, model))[1]
+        lanes, none = random.integers(0, 2, (4, 4)), np.zeros(4, bool)
+        assert tuple(decoded(model, lanes, none)) == _best(model, costs_of(model, lanes, none))[1]
 
 
 @given(_streams(), st.integers(0, 9))
@@ -109,7 +121,7 @@ def test_live_ticks_follow_the_best_path_to_the_newest(
     stream: tuple[SegmentModel, NDArray[np.int64], NDArray[np.bool_]], lag: int
 ) -> None:
     model, lanes, refused = stream
-    costs, decoder = emissions(lanes, model, refused), Decoder(model, lag)
+    costs, decoder = costs_of(model, lanes, refused), Decoder(model, lag)
     grasps, state = 0, model.n_types
     for now, (row, no) in enumerate(zip(lanes.tolist(), refused.tolist(), strict=True)):
         found, path = decoder.push(row, no), _best(model, costs[: now + 1])[1]
@@ -131,7 +143,7 @@ def test_a_lag_as_long_as_the_stream_segments_the_whole(
     decoder = Decoder(model, len(lanes) + more)
     for row, no in zip(lanes.tolist(), refused.tolist(), strict=True):
         assert decoder.push(row, no).state == model.n_types
-    assert decoder.finish() == decode(model, emissions(lanes, model, refused)).tolist()
+    assert decoder.finish() == decoded(model, lanes, refused)
 
 
 def test_without_durations_it_is_a_textbooks_viterbi_on_a_long_stream() -> None:
@@ -149,7 +161,8 @@ def test_without_durations_it_is_a_textbooks_viterbi_on_a_long_stream() -> None:
     )
     truth = np.repeat(random.integers(0, n_types + 1, ticks // 30), 30)
     lanes = random.integers(0, 100, (ticks, n_types + 1)) + 60 * (truth[:, np.newaxis] == np.arange(n_types + 1))
-    costs = emissions(lanes, model)
+    none = np.zeros(ticks, bool)
+    costs = costs_of(model, lanes, none)
     change = np.tile([*model.direct, 0], (n_types + 1, 1))
     change[n_types, :n_types], change[:n_types, n_types] = model.enter, model.leave
     np.fill_diagonal(change, 0)
@@ -163,7 +176,7 @@ def test_without_durations_it_is_a_textbooks_viterbi_on_a_long_stream() -> None:
     for sources in reversed(came):
         states.append(int(sources[states[-1]]))
     path = np.array(states[::-1])
-    found = decode(model, costs)
+    found = np.array(decoded(model, lanes, none))
 
     def cost(each: NDArray[np.integer]) -> int:
         return int(paid[np.arange(ticks), each].sum() + change[each[:-1], each[1:]].sum())

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.published import NONE
-from thenar.runtime.segmenting.decoder import GRACE_US, LiveSegments, Segment, decode, emissions
+from thenar.runtime.segmenting.decoder import GRACE_US, Decoder, LiveSegments, Segment
 from thenar.runtime.segmenting.model import SegmentModel
 
 TICK = 10_000
@@ -34,7 +34,10 @@ def expected(stream: Sequence[Any], lag: int) -> list[Segment]:
     """Return the segment at every tick, from paths that are found anew for each."""
     found, number, before = list[Segment](), 0, 2
     for tick in range(len(stream)):
-        path = decode(MODEL, emissions(stream[: tick + 1], MODEL)).tolist()
+        decoder = Decoder(MODEL, tick + 1)
+        for row in stream[: tick + 1]:
+            decoder.push(row)
+        path = decoder.finish()
         then = tick - lag
         state = path[then] if then >= 0 else 2
         number += state not in (before, 2)

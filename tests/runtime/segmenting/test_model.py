@@ -3,13 +3,12 @@
 import math
 
 import msgspec
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.errors import BuildError
-from thenar.runtime.segmenting.decoder import _NEVER, _Paths, emissions
+from thenar.runtime.segmenting.decoder import _NEVER, _Paths
 from thenar.runtime.segmenting.model import LARGEST, SegmentModel, gain_of
 
 _USUAL = SegmentModel.usual(3, True, 100.0)
@@ -53,7 +52,7 @@ def test_gains_are_as_near_as_bytes_allow(scale: float, temperature: float) -> N
     st.none() | st.integers(0, 99),
     st.lists(st.tuples(st.lists(st.integers(-32767, 32767), min_size=4, max_size=4), st.booleans()), max_size=5),
 )
-def test_frames_cost_the_same_live_and_all_at_once(
+def test_frames_cost_what_the_text_says(
     shift: int, gain: int, most: int, refusal: int | None, frames: list[tuple[list[int], bool]]
 ) -> None:
     most = most if shift == 8 else min(most, max(255 * gain >> 8, 1))
@@ -63,20 +62,12 @@ def test_frames_cost_the_same_live_and_all_at_once(
         shift=shift, gain=gain, most=most, least=one, stay=one, enter=one[1:], leave=one[1:], direct=one[1:],
         refusal=refusal,
     )  # fmt: skip
-    lanes = np.array([row for row, _ in frames], np.int64).reshape(-1, 4)[:, : model.n_lanes]
-    refused = [no and refusal is not None for _, no in frames]
-    found = emissions(lanes, model, refused).tolist()
-    assert found == [model.costs(row, no) for row, no in zip(lanes.tolist(), refused, strict=True)]
-    for row, no, costs in zip(lanes.tolist(), refused, found, strict=True):
+    for lanes, said in frames:
+        row, no = lanes[: model.n_lanes], said and refusal is not None
         by_hand = [min(((max(row) - lane) >> shift) * gain // 256, most) for lane in row]
         if refusal is not None:
             by_hand = [cost + refusal * no for cost in by_hand] + [0 if no else refusal]
-        assert costs == by_hand
-
-
-def test_scores_of_other_classes_are_refused() -> None:
-    with pytest.raises(BuildError, match=r"scores have shape \(2, 3\), but the segment model takes 4 a frame"):
-        emissions(np.zeros((2, 3), int), _USUAL)
+        assert model.costs(row, no) == by_hand
 
 
 @given(st.data())

@@ -1,15 +1,24 @@
-"""A server, and clients that speak HTTP and WebSocket to it as a browser does, or as an attacker."""
+"""A server, and clients that speak HTTP and WebSocket to it as a browser does, or as an attacker; a build's folder."""
 
+import hashlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from http.client import HTTPConnection, HTTPResponse
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from msgspec.structs import replace
 from websockets.sync.client import ClientConnection, connect
 
+from thenar.compiler.hand import grid_hand
+from thenar.runtime import Build
+from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
+from thenar.runtime.hand import HAND_NAME, hand_to_bytes
+from thenar.runtime.manifest_file import manifest_to_bytes
+from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.web.server import Server
 
 PATIENCE_S = 20
@@ -69,3 +78,15 @@ def visit() -> Callable[[Server], Client]:
 @pytest.fixture
 def hear() -> Callable[[ClientConnection], dict[str, Any]]:
     return told
+
+
+@pytest.fixture
+def folder(make_build: Callable[..., Build], tmp_path: Path) -> Path:
+    """Return the folder of a build of six switches, s0 to s5."""
+    build = make_build(joints=0)
+    hand = hand_to_bytes(grid_hand(build.manifest))
+    manifest = replace(build.manifest, hand_sha256=hashlib.sha256(hand).hexdigest())
+    (tmp_path / TABLES_NAME).write_bytes(tables_to_bytes(build.tables))
+    (tmp_path / HAND_NAME).write_bytes(hand)
+    (tmp_path / MANIFEST_NAME).write_bytes(manifest_to_bytes(manifest))
+    return tmp_path

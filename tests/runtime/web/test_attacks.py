@@ -403,3 +403,21 @@ def test_a_browser_that_stops_reading_is_dropped_and_others_see_all(
                     pass
             client.server.publish("last", message("last"))
             assert hear(live)["topic"] == "last"
+
+
+def test_who_asks_for_much_and_reads_nothing_loses_its_place(serve: Callable[..., Any]) -> None:
+    taken: list[object] = []
+
+    def reply(asked: object) -> bytes:
+        taken.append(asked)
+        return b'"' + (server.MOST_UNREAD // 4) * b"x" + b'"'
+
+    client = serve(on_message=reply)
+    question = b'{"do":"moments"}'
+    with connection(client, upgrade(client)) as deaf:
+        assert deaf.recv(12) == b"HTTP/1.1 101"
+        eventually(lambda: client.server.pages == 1)
+        deaf.sendall(30 * (bytes((0x81, 0x80 | len(question), 0, 0, 0, 0)) + question))
+        eventually(lambda: client.server.pages == 0)
+    # A little more is on its way: what the system buffers.
+    assert 5 <= len(taken) <= 10

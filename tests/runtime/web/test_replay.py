@@ -1,6 +1,5 @@
 """The page of a recording that no build recognised: what a build makes of it now, and what was labelled."""
 
-import hashlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -10,16 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
-from thenar.compiler.hand import grid_hand
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
-from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.hand import HAND_NAME, hand_to_bytes
-from thenar.runtime.manifest_file import manifest_to_bytes
-from thenar.runtime.model.integers import tables_to_bytes
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.web import replay as module
@@ -28,17 +21,6 @@ from thenar.runtime.web.replay import MOST_MOMENTS, Replay
 NAMES = tuple(f"s{number}" for number in range(6))
 HARNESS = f'name = "mine"\n[[stream]]\nport = "/dev/none"\nswitches = {list(NAMES)}\n'.replace("'", '"')
 HELD_US = 1_000_000
-
-
-@pytest.fixture
-def folder(make_build: Callable[..., Build], tmp_path: Path) -> Path:
-    build = make_build(joints=0)
-    hand = hand_to_bytes(grid_hand(build.manifest))
-    manifest = replace(build.manifest, hand_sha256=hashlib.sha256(hand).hexdigest())
-    (tmp_path / TABLES_NAME).write_bytes(tables_to_bytes(build.tables))
-    (tmp_path / HAND_NAME).write_bytes(hand)
-    (tmp_path / MANIFEST_NAME).write_bytes(manifest_to_bytes(manifest))
-    return tmp_path
 
 
 def collected(path: Path, switches: tuple[str, ...], rows: tuple[int, ...]) -> Path:

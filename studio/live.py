@@ -1,0 +1,115 @@
+"""The page *Live*: the build in use on the project's glove, or one of its recordings.
+
+The run is one for all pages. A recording is shown to each page that asks for it, by the ids in its address; the few
+that were shown last stay read.
+"""
+
+from shlex import quote
+from threading import Event
+
+from thenar.drivers.errors import SettingError, ThenarError
+from thenar.runtime.glove import Glove
+from thenar.runtime.web.live import LivePage
+from thenar.runtime.web.replay import Replay
+from thenar.runtime.web.server import message
+
+from .studio import Asked, Handler, Report, Studio
+
+_MOST_REPLAYS = 4
+
+
+class StudioLive:
+    """The page *Live* of a studio."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio, self._project = studio, studio.project
+        # The checksum of the build that runs; and set when another came into use.
+        self._running, self._swap = "", Event()
+        self._unread = ""  # a sentence on inputs that the running build lacks on this glove
+        self._replays = dict[tuple[str, ...], Replay]()
+        requests: dict[str, Handler] = {
+            "run": self._run,
+            "halt": lambda _: studio.station.stop() if studio.station.doing == "live" else None,
+            "use-build": self._use,
+            "replay": lambda asked: self._replay(asked.ids).about,
+            **dict.fromkeys(("overview", "moments"), self._reply),
+        }
+        studio.add("live.html", "Live", requests, self.read)
+        studio.closing.callback(self._close)
+
+    def read(self, _: Report) -> None:
+        """Let a run go on with the build in use, and tell the page."""
+        built = self._project.build()
+        if built is not None and self._running not in ("", built[1].manifest.checksum):
+            self._swap.set()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Publish the commands that do what the page's buttons do, and what is wrong."""
+        project = self._project
+        members = [member for kind in ("recording", "build") for member in project.members(kind)]
+        paths = {member.id: quote(str(project.folder / member.name)) for member in members}
+        why, built = self._lacking(), project.build()
+        run = "" if built is None else f"thenar run {quote(str(built[0]))} --glove {quote(str(project.harness))} --web"
+        self._studio.publish("live", message("live", paths=paths, run=run, why=why, unread=self._unread))
+
+    def _lacking(self) -> str:
+        """Return in a sentence what a run lacks, or ""."""
+        if self._project.build() is None:
+            return "the project has no build in use: train one, or choose one"
+        if not self._project.harness.exists():
+            return f"{self._project.harness} is missing: it says how the glove is wired"
+        return ""
+
+    def _run(self, _: Asked) -> None:
+        if why := self._lacking():
+            raise SettingError(why)
+        if self._studio.station.doing != "live":
+            self._studio.station.start("live", self._work)
+
+    def _work(self, stop: Event) -> None:
+        """Run the build in use, and whichever comes into use then, until `stop` is set."""
+        page: LivePage | None = None
+        try:
+            while not stop.is_set():
+                self._swap.clear()
+                if (built := self._project.build()) is None:
+                    raise SettingError(self._lacking())
+                folder, build = built
+                self._running = build.manifest.checksum
+                with Glove(build, self._project.harness, stop=stop) as glove:
+                    self._unread = glove.system.unread
+                    self._tell()
+                    page = LivePage(self._studio.server, glove, folder, page)
+                    for moment in glove:
+                        page.show(moment)
+                        if self._swap.is_set():
+                            break
+        finally:
+            self._running = self._unread = ""
+            self._tell()
+
+    def _use(self, asked: Asked) -> None:
+        self._project.remember(build=self._project.path("build", asked.id).name)
+        self._studio.changed()
+
+    def _replay(self, ids: tuple[str, ...]) -> Replay:
+        """Return a recording, the first id, with builds, the others, or with the build in use."""
+        used = [member.id for member in self._project.members("build") if member.name == self._project.state.build]
+        key = (*ids, *used) if len(ids) == 1 else ids
+        if not 2 <= len(key) <= 3:
+            raise ThenarError("choose a recording, and one build or two")
+        if key not in self._replays:
+            recording, *builds = key
+            folders = [self._project.path("build", build) for build in builds]
+            self._replays[key] = Replay(self._project.path("recording", recording), folders)
+            for old in list(self._replays)[:-_MOST_REPLAYS]:
+                self._replays.pop(old).close()
+        return self._replays[key]
+
+    def _reply(self, asked: Asked) -> bytes:
+        return self._replay(asked.ids).reply(asked.do, asked.numbers)
+
+    def _close(self) -> None:
+        for replay in self._replays.values():
+            replay.close()
