@@ -41,7 +41,7 @@ const ask = openPage({
   },
   exported: ({ said, address, name }) => {
     say($("exported"), said);
-    $("download").hidden = !address;
+    $("download").hidden = false;
     const link = $("download").firstChild;
     link.href = address;
     link.download = name;
