@@ -139,7 +139,7 @@ class QuickAccuracy:
         return np.flatnonzero(self.trial == trial)
 
     def seen(self, trial: int) -> Floats:
-        """Return what each sensor (d,) showed in a trial on average, 0 to 1 of its range in the set.
+        """Return the value of each sensor (d,) in a trial on average, 0 to 1 of its range in the set.
 
         Raises EvaluationError if there is no such trial.
         """

@@ -8,7 +8,7 @@ import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const percent = (share) => `${Math.round(100 * share)} %`;
-const STEP = 24; // so many trials are shown at a time
+const STEP = 24; // the number of trials that are shown at a time
 const SVG = "http://www.w3.org/2000/svg";
 
 let set = null; // the message on the set
