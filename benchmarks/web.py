@@ -199,7 +199,7 @@ def heap_of(driver: "WebDriver") -> float:
     driver.execute_cdp_cmd("HeapProfiler.collectGarbage", {})
     driver.execute_cdp_cmd("Performance.enable", {})
     metrics = driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
-    return next(metric["value"] for metric in metrics if metric["name"] == "JSHeapUsedSize") / 1e6
+    return float(next(metric["value"] for metric in metrics if metric["name"] == "JSHeapUsedSize")) / 1e6
 
 
 def renderer_s(driver: int) -> float:

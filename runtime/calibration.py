@@ -188,7 +188,12 @@ def place_of(joint: str, sensor_names: Sequence[str]) -> int:
 def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
     """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError if there is none."""
     if calibration is None or (isinstance(calibration, tuple) and joint.unit == RAW):
-        return _raw(joint)
+        if joint.code_a in _RAW_CODES and joint.code_b in _RAW_CODES and joint.code_a != joint.code_b:
+            return tuple(range(_BYTES))
+        raise SettingError(
+            f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in the glove's bytes: calibrate it "
+            "(`thenar calibrate`) and name the file in glove.toml: `calibration` of [cyberglove], or of the [[stream]]"
+        )
     if isinstance(calibration, GloveCalibration) and calibration.unit != joint.unit:
         raise SettingError(
             f"the glove is calibrated in {calibration.unit!r}, joint {joint.name!r} of the build in {joint.unit!r}: "
@@ -201,12 +206,3 @@ def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
     sensor = lines[joint.name]
     line = code_line(joint, (sensor.raw_a, sensor.value_a), (sensor.raw_b, sensor.value_b))
     return tuple(map(line.code, range(_BYTES)))
-
-
-def _raw(joint: Calibration) -> tuple[int, ...]:
-    if joint.code_a in _RAW_CODES and joint.code_b in _RAW_CODES and joint.code_a != joint.code_b:
-        return tuple(range(_BYTES))
-    raise SettingError(
-        f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in the glove's bytes: calibrate it "
-        "(`thenar calibrate`) and name the file in glove.toml: `calibration` of [cyberglove], or of the [[stream]]"
-    )

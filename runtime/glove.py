@@ -224,16 +224,12 @@ class Glove:
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False
         devices, overflowed = self.sources.health(), self.sources.overflowed
-        self.health = self._health.report(now, devices, overflowed, self._troubles())
+        failure = None if self.recorder is None else self.recorder.failure
+        recording = () if failure is None else (OutputTrouble("recording", failure),)
+        self.health = self._health.report(now, devices, overflowed, (*recording, *self._fanout.troubles()))
         if self._status:
             self._fanout.health(self.health)
         self.sources.raise_settings()
-
-    def _troubles(self) -> tuple[OutputTrouble, ...]:
-        """Return the troubles of the recording and of the sinks."""
-        failure = None if self.recorder is None else self.recorder.failure
-        recording = () if failure is None else (OutputTrouble("recording", failure),)
-        return (*recording, *self._fanout.troubles())
 
     def _session(self) -> "Session":
         # It takes a third as long to import as everything else.

@@ -48,7 +48,6 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_texts(manifest)
     yield from _wrong_columns(manifest)
     yield from _wrong_rejection(manifest)
-    yield from _wrong_segments(manifest)
     for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
@@ -56,6 +55,9 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     if proof.width != manifest.options.width or max(proof.covered, proof.changed) > manifest.proved_rows:
         yield "proves something of other tables than it describes"
     yield from _wrong_counts(manifest)
+    segments, has_none = manifest.segments, manifest.grasps[-1] == NONE
+    if segments and (segments.n_lanes, segments.refusal is None) != (len(manifest.grasps), has_none):
+        yield "has costs of segments of other classes than its tables"
     wearing, adapted, joints = manifest.wearing, manifest.adapted, len(manifest.joints)
     if wearing is not None and len(wearing.related) not in (0, joints * (joints - 1) // 2):
         yield "relates other joints than it has"
@@ -119,12 +121,6 @@ def _wrong_columns(manifest: Manifest) -> Iterator[str]:
         yield "keeps a switch that the recordings do not have"
     if max(joints, default=-1) >= source.joints:
         yield "keeps a joint that the recordings do not have"
-
-
-def _wrong_segments(manifest: Manifest) -> Iterator[str]:
-    segments, has_none = manifest.segments, manifest.grasps[-1] == NONE
-    if segments and (segments.n_lanes, segments.refusal is None) != (len(manifest.grasps), has_none):
-        yield "has costs of segments of other classes than its tables"
 
 
 def _wrong_rejection(manifest: Manifest) -> Iterator[str]:

@@ -148,7 +148,11 @@ class Scorer:
             raise FrameError(f"a frame has codes of shape {array.shape}, but the build has {expected} joints")
         values: list[int] = array.tolist()
         if array.dtype != np.uint16 and values:
-            _check_codes(array, values)
+            if array.dtype.kind not in "iu":
+                raise FrameError(f"joint codes must be integers, but this frame has {array.dtype}")
+            if min(values) < 0 or max(values) > HIGHEST_CODE:
+                wrong = next(value for value in values if not 0 <= value <= HIGHEST_CODE)
+                raise FrameError(f"joint codes must be 0 to {HIGHEST_CODE}, but this frame has {wrong}")
         return values
 
 
@@ -281,11 +285,3 @@ def _flags(flags: ArrayLike, expected: int, what: str) -> list[bool]:
     if array.dtype != np.bool_ and any(value not in (0, 1) for value in values):
         raise FrameError(f"{what} must be 0 or 1, but this frame has {next(v for v in values if v not in (0, 1))!r}")
     return values
-
-
-def _check_codes(array: NDArray[np.generic], values: list[int]) -> None:
-    if array.dtype.kind not in "iu":
-        raise FrameError(f"joint codes must be integers, but this frame has {array.dtype}")
-    if min(values) < 0 or max(values) > HIGHEST_CODE:
-        wrong = next(value for value in values if not 0 <= value <= HIGHEST_CODE)
-        raise FrameError(f"joint codes must be 0 to {HIGHEST_CODE}, but this frame has {wrong}")

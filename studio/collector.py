@@ -138,6 +138,7 @@ class Collector:
         return message(
             "trials",
             trials=[(trial.number, trial.grasp, trial.object) for trial in trials],
+            types=list(dict.fromkeys(trial.grasp for trial in self._by_number.values())),
             accuracy=self._accuracy(guide),
         )
 

@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from shlex import join, quote
+from zipfile import ZipFile
 
 from thenar.compiler.artifact.comparing import BuildComparison, compare_builds
 from thenar.compiler.artifact.documents import REPORT_NAME, report_of_build
@@ -140,11 +142,14 @@ def _export(studio: Studio, asked: Asked, _: Report) -> None:
     """Write a build's report, or its firmware, into the project, and tell all pages where."""
     build, page, folder = _places(studio.project, asked)
     if asked.do == "firmware":
-        loaded = Build.load(build)
+        loaded, content = Build.load(build), BytesIO()
         write_folder(firmware_files(loaded.tables, loaded.manifest, asked.name), folder)
-        said, address = TARGETS[asked.name].next_step.format(folder=quote(str(folder))), ""
+        with ZipFile(content, "w") as archive:
+            for path in sorted(folder.rglob("*")):
+                archive.write(path, path.relative_to(folder.parent))
+        name, saved = f"{folder.name}.zip", content.getvalue()
+        said = TARGETS[asked.name].next_step.format(folder=quote(str(folder)))
     else:
-        content = report_of_build(build)
-        write_atomically(page, content)
-        said, address = f"{page} works offline, in any browser", studio.server.offer(page.name, content)
-    studio.publish("exported", message("exported", said=said, address=address, name=page.name))
+        name, saved, said = page.name, report_of_build(build), f"{page} works offline, in any browser"
+        write_atomically(page, saved)
+    studio.publish("exported", message("exported", said=said, address=studio.server.offer(name, saved), name=name))

@@ -1,6 +1,7 @@
 """A project: the recordings, builds and settings that lie in one folder, and what the studio remembers of them."""
 
 import hashlib
+import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +25,8 @@ from thenar.runtime.names import fault, shortened
 from .edits import load_edits
 
 _STATE = "studio.json"
+# Bytes of a name, to which numbers and endings are added: file systems take 255.
+_LONGEST = 200
 # What each kind of member is called, in a folder.
 _KINDS = {"set": "*.grasps", "recording": "*.mcap", "build": "*/build.json"}
 
@@ -181,8 +184,8 @@ class Project:
         """
         if reason := fault(name):
             raise SettingError(f"the name {shortened(repr(name))} {reason}")
-        if "/" in name or name.startswith("."):
-            raise SettingError(f"the name {shortened(repr(name))} is not possible: use letters, digits and spaces")
+        if "/" in name or name.startswith(".") or len(os.fsencode(name)) > _LONGEST:
+            raise SettingError(f"the name {shortened(repr(name))} is not possible: use some letters, digits and spaces")
         for number in range(1, 10_000):
             stem = name if number == 1 else f"{name}-{number}"
             if not any((self.folder / f"{stem}{end}").exists() for end in (ending, *others)):

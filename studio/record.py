@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 
 from thenar.compiler.recordings import check_names
+from thenar.compiler.recordings.edits import trials_of
+from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.compiler.recordings.taxonomy import ANY, collected
 from thenar.drivers.errors import SettingError, ThenarError
@@ -16,6 +18,7 @@ from thenar.runtime.recording.session import Collection
 from thenar.runtime.web.server import message
 
 from .collector import Collector
+from .edits import change, load_edits
 from .studio import Asked, Report, Studio
 
 _MOST_REPETITIONS = 1000
@@ -28,8 +31,9 @@ class RecordPage:
         self._studio, self._project, self._collector = studio, studio.project, collector
         # What is known of a recording, by its path, size and time of change: reading a long one takes a second.
         self._known = dict[tuple[Path, int, int], tuple[str, int, int] | None]()
-        requests = {"record": self._begin, "continue": self._continue} | collector.requests
-        studio.add("record.html", "Record", requests, self.read)
+        self._recorded: Path | None = None
+        requests = {"record": self._begin, "continue": self._continue, "relabel": self._relabel}
+        studio.add("record.html", "Record", requests | collector.requests, self.read)
 
     def read(self, report: Report) -> None:
         """Show which recordings can be continued, and what can be recorded."""
@@ -40,7 +44,10 @@ class RecordPage:
                 found.append(
                     {"id": member.id, "name": member.name, "subject": about[0], "done": about[1], "total": about[2]}
                 )
-        objects = self._objects
+        objects, name = self._objects, "" if self._recorded is None else self._recorded.name
+        latest = {edit.of: edit.new for edit in load_edits(self._project.edits)[0] if edit.of[0] == name}
+        edits = {trial[5]: new for trial, new in latest.items() if new != trial[3]}
+        self._studio.publish("relabelled", message("relabelled", set=name, trials=edits))
         self._studio.publish(
             "recordings",
             message(
@@ -106,12 +113,26 @@ class RecordPage:
         journal = read_journal(path)
         self._start(path, _collection(journal), journal)
 
+    def _relabel(self, asked: Asked) -> None:
+        """Make a trial of the set that was just recorded another type; an empty name leaves it out."""
+        if self._recorded is None:
+            raise SettingError("nothing was recorded here yet: end the recording first, or use the page Errors")
+        grasp_set = GraspSet.load(self._recorded)
+        trials = {trial[5]: trial for trial in trials_of(self._recorded.name, grasp_set)}
+        if asked.trial not in trials:
+            raise SettingError(f"trial {asked.trial} is not in {self._recorded.name}")
+        if asked.name not in ("", *grasp_set.taxonomy.types):
+            raise SettingError(grasp_set.taxonomy.unknown(asked.name))
+        change(self._project.edits, [trials[asked.trial]], asked.name)
+        self._studio.changed()
+
     def _check_glove(self) -> None:
         if not self._project.harness.exists():
             raise SettingError("the project has no glove.toml: connect a glove on the page Glove first")
         self._project.wiring()
 
     def _start(self, recording: Path, collection: Collection, journal: Journal | None) -> None:
+        self._recorded = None
         self._studio.publish("finished", message("finished", set=""))
         write = partial(self._write, recording, len(planned(collection)))
         self._collector.start("recording", collection, recording, journal, write)
@@ -122,6 +143,7 @@ class RecordPage:
             output = recording.with_suffix(".grasps")
             grasp_set, report = import_recordings([recording])
             grasp_set.save(output)
+            self._recorded = output
             warnings = [finding.message for finding in report.warnings]
             about = {
                 "set": output.name,

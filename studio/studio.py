@@ -27,6 +27,8 @@ from .project import Project
 PAGES = Path(__file__).parent / "pages"
 _MOST_QUEUED = 8
 _LOOK_S = 0.2
+# What is said of devices is old after this time.
+_LASTS_S = 2.0
 Report = Callable[[int, int], None]
 
 
@@ -242,4 +244,4 @@ class Station:
 def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
     """Return the message on the bar about the state of the glove's devices."""
     lost = ", ".join(f"{device.name} lost" for device in devices if not device.connected)
-    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"})
+    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"}, lasts_s=_LASTS_S)

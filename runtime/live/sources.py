@@ -82,7 +82,10 @@ class DeviceThread:
             try:
                 self._device.open()
                 self._become(connected=True, error="")
-                self._read()
+                while not self._stop.is_set():
+                    frame = self._device.read(READ_S)
+                    if frame is not None:
+                        self._take(frame)
             except SettingError as wrong:
                 self._become(connected=False, error=str(wrong))
                 # It worked before, so it can again: only a garbled reply can say otherwise.
@@ -104,12 +107,6 @@ class DeviceThread:
             self._log().debug("%s: closing it: %s", self.state.name, gone)
         except BaseException as fault:  # as above
             self._blame(f"{type(fault).__name__}: {fault}")
-
-    def _read(self) -> None:
-        while not self._stop.is_set():
-            frame = self._device.read(READ_S)
-            if frame is not None:
-                self._take(frame)
 
     def _blame(self, fault: str) -> None:
         """Count an exception, and log it with its trace, once: a device that opens and then fails does so for hours."""

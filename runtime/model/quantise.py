@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .integers import COARSE, FINEST_SCALE, IntegerTables
 from .tables import ScoreTables
-from .terms.base import CoreTerm, Floats, rounded
+from .terms.base import Floats, rounded
 from .terms.line import LARGEST_SLOPE, WIDEST, Line
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
@@ -78,10 +78,10 @@ def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) 
     do sums and spans, and bisection over the doubles is exact. With lines, or rows on a `grid`, the result is only one
     of the largest.
     """
-    whole = reach(tables, 1.0, whole=False)
+    extremes = Extremes(tables, grid)
+    whole = extremes.reach(1.0, whole=False)
     if whole == 0:
         return 1.0
-    extremes = _Extremes(tables, grid)
     most = limit + grid * (len(tables.terms) - len(tables.lines) + 2) + WIDEST * len(tables.lines)
     unbound = grid > 1 or widest >= 2 * limit  # a lookup is a part of some sum
     fits, too_fine = 0.0, min(most / whole, FINEST_SCALE)
@@ -98,27 +98,10 @@ def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
     return sum((term.rounding_error(scale, grid) for term in tables.core_terms), 0.5)
 
 
-def reach(tables: ScoreTables, scale: float, *, whole: bool = True, grid: int = 1) -> float:
-    """Return the largest absolute value of a partial sum of the scaled rows, in any order; infinity if an entry of a
-    slope's row does not fit its byte.
-    """
-    return _Extremes(tables, grid).reach(scale, whole=whole)
-
-
-def span(tables: ScoreTables, scale: float) -> float:
-    """Return the largest difference between results of one lookup for a class.
-
-    A lookup returns a joint's row or zero, scaled and rounded, or the sum of the rows of some of GROUP_SIZE consecutive
-    switches. Zero, which `balance` puts between a joint's rows anyway, is included so that no span shrinks as the scale
-    grows.
-    """
-    return _Extremes(tables, 1).span(scale)
-
-
-class _Extremes:
+class Extremes:
     """The largest and smallest contributions of bias and terms, at any scale: rounding keeps them extreme."""
 
-    def __init__(self, tables: ScoreTables, grid: int) -> None:
+    def __init__(self, tables: ScoreTables, grid: int = 1) -> None:
         fixed = [term for term in tables.core_terms if not isinstance(term, Line)]
         ends = [(tables.bias, tables.bias), *(term.ends for term in fixed)]
         self._n_switches, self._lines = tables.n_switches, tables.lines
@@ -144,7 +127,9 @@ class _Extremes:
         return np.maximum(upper, 0), np.minimum(lower, 0)
 
     def reach(self, scale: float, *, whole: bool = True) -> float:
-        """Return the largest absolute value of a partial sum."""
+        """Return the largest absolute value of a partial sum of the scaled rows, in any order; infinity if an entry of
+        a slope's row does not fit its byte.
+        """
         upper, lower = self._at(scale, whole=whole)
         slopes = [line.whole(scale, 1) if whole else line.slope(scale) for line in self._lines]
         if whole and any(np.abs(slope.row).max() > LARGEST_SLOPE for slope in slopes):
@@ -155,18 +140,18 @@ class _Extremes:
         return float(max(upper.sum(axis=0).max(), -lower.sum(axis=0).min()))
 
     def span(self, scale: float) -> float:
-        """Return the largest span of a lookup."""
+        """Return the largest difference between results of one lookup for a class.
+
+        A lookup returns a joint's row or zero, scaled and rounded, or the sum of the rows of some of GROUP_SIZE
+        consecutive switches. Zero, which `balance` puts between a joint's rows anyway, is included so that no span
+        shrinks as the scale grows.
+        """
         upper, lower = self._at(scale, whole=True)
         switches, others = np.split(upper[1:] - lower[1:], [self._n_switches])
         # Sums of integers are exact, and so is the difference of two of them, GROUP_SIZE switches apart.
         sums = np.cumsum(np.vstack([np.zeros((GROUP_SIZE, upper.shape[1])), switches]), axis=0)
         groups = sums[GROUP_SIZE:] - sums[:-GROUP_SIZE]
         return float(np.vstack([groups, others]).max(initial=0.0))
-
-
-def _whole(tables: ScoreTables, scale: float, grid: int) -> list[CoreTerm]:
-    """Return the terms in whole steps."""
-    return [term.whole(scale, grid) for term in _centred(tables, scale).core_terms]
 
 
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
@@ -200,11 +185,11 @@ def quantise(
     while True:
         scale = finest_scale(balanced, limit - room, 2**entry_bits - 1, grid)
         bias = _whole_bias(balanced, scale, grid, means)
-        beyond = reach(ScoreTables(bias / scale, balanced.terms), scale, grid=grid) - limit
+        beyond = Extremes(ScoreTables(bias / scale, balanced.terms), grid).reach(scale) - limit
         if grid == 1 or beyond <= 0:
             break
         room += beyond  # the compensation in the bias needs room, too
-    terms = tuple(term.integers() for term in _whole(balanced, scale, grid))
+    terms = tuple(term.whole(scale, grid).integers() for term in _centred(balanced, scale).core_terms)
     s, j, K = tables.n_switches, tables.n_joints, tables.n_classes
     none = np.zeros((s + j, K), np.int16)
     integers = IntegerTables(bias.astype(np.int16), terms, none[:s], none[s:], scale, grid)

@@ -168,9 +168,12 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
     content = convert(source, (), tables, _File)
     _check_joints(source, content)
     _check_preshapes(source, content)
-    chosen = {
-        grasp: preshape for entry in content.preshapes for preshape in [_made(content, entry)] for grasp in entry.grasps
-    }
+    names, factors = tuple(joint.name for joint in content.joints), [_TO_SI[joint.unit] for joint in content.joints]
+    chosen = dict[str, Preshape]()
+    for entry in content.preshapes:
+        positions = tuple(position * factor for position, factor in zip(entry.positions, factors, strict=True))
+        preshape = Preshape(entry.name, names, positions, content.time_from_start_s)
+        chosen |= dict.fromkeys(entry.grasps, preshape)
     return PreshapeTable(content.name, chosen)
 
 
@@ -249,14 +252,3 @@ def _check_positions(source: TomlText, place: Place, entry: _Entry, joints: tupl
         if not low <= position <= high:
             reason = f"{position:g} {joint.unit} is outside {low:g} to {high:g}, the range of {joint.name}"
             raise source.error((*place, number), reason)
-
-
-def _made(content: _File, entry: _Entry) -> Preshape:
-    return Preshape(
-        name=entry.name,
-        joint_names=tuple(joint.name for joint in content.joints),
-        positions=tuple(
-            position * _TO_SI[joint.unit] for position, joint in zip(entry.positions, content.joints, strict=True)
-        ),
-        time_from_start_s=content.time_from_start_s,
-    )

@@ -176,7 +176,12 @@ class RecordStream:
             while (record := self._next(file)) is not None:
                 yield record
                 if record.opcode == Opcode.FOOTER:
-                    self.end = self._ended(record.end, file.read(len(MAGIC)))
+                    whole, closed = record.end + len(MAGIC), file.read(len(MAGIC)) == MAGIC
+                    if closed:
+                        more = "bytes follow the end of the recording" if whole < self.size else ""
+                        self.end = End(True, whole, self.size, more)
+                    else:
+                        self.end = End(False, record.end, self.size, "its last 8 bytes are missing or damaged")
                     return
 
     def begin_section(self) -> None:
@@ -209,12 +214,6 @@ class RecordStream:
             self._crc = crc32(piece, self._crc)
             length -= len(piece)
         return None
-
-    def _ended(self, whole: int, magic: bytes) -> End:
-        if magic != MAGIC:
-            return End(False, whole, self.size, "its last 8 bytes are missing or damaged")
-        whole += len(MAGIC)
-        return End(True, whole, self.size, "bytes follow the end of the recording" if whole < self.size else "")
 
     def _fault(self, offset: int, opening: bytes) -> str:
         """Return why no whole record begins at `offset` with the bytes `opening`, or nothing."""

@@ -104,7 +104,10 @@ _OF_TAXELS = ("taxels", "taxel_calibration")
 def to_metadata(session: Session) -> dict[str, str]:
     """Return `session` as the keys and texts of a Metadata record."""
     written = [field.name for field in _FIELDS if session.taxels or field.name not in _OF_TAXELS]
-    texts = {name: _text(getattr(session, name)) for name in written}
+    values = {name: getattr(session, name) for name in written}
+    texts = {
+        name: value if isinstance(value, str) else msgspec.json.encode(value).decode() for name, value in values.items()
+    }
     return {"version": str(VERSION), **texts}
 
 
@@ -132,10 +135,6 @@ def _check_names(session: Session) -> None:
     for name in sorted(names):
         if reason := fault(name):
             raise FormatError(f"its metadata name {shortened(repr(name))}, which {reason}")
-
-
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else msgspec.json.encode(value).decode()
 
 
 def _value(field: Any, texts: dict[str, str]) -> Any:

@@ -26,85 +26,6 @@ from .session import Label, Session
 SYNC_S = 1.0
 
 
-class AppendedFile:
-    """Appends to `path`.
-
-    Data has reached the operating system when `append` returns: no kill can take it. A power failure can take about the
-    last second, because a separate thread calls fdatasync that often; nobody waits for it. What does not fit on a full
-    disk is lost, and `failure` says so until something fits again; the file keeps its whole records. A disk that does
-    not keep what it took ends it.
-    """
-
-    def __init__(self, path: Path, size: int, sync_s: float = SYNC_S) -> None:
-        """Continue after the first `size` bytes of the file; the rest is cut off. Raises OSError."""
-        self.size = size
-        # Two threads fail: a write is tried again, a disk that kept nothing is not.
-        self._full: str | None = None
-        self._broken: str | None = None
-        self._path = path
-        self._synced = size
-        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
-        try:
-            os.ftruncate(self._file, size)
-        except OSError:
-            os.close(self._file)
-            raise
-        self._closing = Event()
-        self._thread = Thread(target=self._keep_synced, args=(sync_s,), name="thenar recording", daemon=True)
-        self._thread.start()
-
-    @property
-    def failure(self) -> str | None:
-        """Why nothing can be written now; None while there is no error."""
-        return self._broken or self._full
-
-    def append(self, data: bytes) -> bool:
-        """Append `data` whole and return True; return False if that fails, and when closed."""
-        if self._broken is not None or self._closing.is_set():
-            return False
-        try:
-            written = os.write(self._file, data)
-            while written < len(data):
-                written += os.write(self._file, data[written:])
-        except OSError as reason:
-            self._full = self._sentence(reason)
-            try:
-                # Remove the part of the record that fitted.
-                os.ftruncate(self._file, self.size)
-            except OSError as worse:
-                self._broken = self._sentence(worse)
-            return False
-        self.size += len(data)
-        self._full = None
-        return True
-
-    def close(self) -> None:
-        """Write everything to the disk and close. May wait for the disk; may be called again."""
-        if self._closing.is_set():
-            return
-        self._closing.set()
-        self._thread.join()
-        self._sync()
-        os.close(self._file)
-
-    def _keep_synced(self, every_s: float) -> None:
-        while not self._closing.wait(every_s):
-            self._sync()
-
-    def _sync(self) -> None:
-        size = self.size
-        if size == self._synced or self._broken is not None:
-            return
-        try:
-            os.fdatasync(self._file)
-        except OSError as reason:
-            self._broken = self._sentence(reason)
-        self._synced = size
-
-    def _sentence(self, reason: OSError) -> str:
-        return f"{self._path}: {reason.strerror}: nothing more is written after {self.size} bytes, all of them whole"
-
-
 # Opcode, length of the rest, channel, sequence, log time, publish time (MCAP specification, Message).
 _MESSAGE = Struct("<BQHIQQ")
 _MESSAGE_OPCODE, _OPENING = 5, 9
@@ -120,14 +41,18 @@ class _Recognition(LiveGrasp, frozen=True, omit_defaults=True):
 
 
 class Recorder(Closing):
-    """Writes a recording; every message has left the process when its method returns.
+    """Writes a recording; every message has left the process when its method returns: no kill can take it.
+
+    A power failure can take about the last second, because a separate thread calls fdatasync that often; nobody waits
+    for it.
 
     A message is published at the time of its frame and logged then too, but never before the message written last: the
     file is in the order of its log times. Both use the monotonic clock, set to the date once when the session begins,
     so that a later change of the date moves nothing.
 
-    A full disk raises nothing: what does not fit is lost, and counted in `lost`; recording goes on once there is room.
-    `failure` says why nothing can be written now.
+    A full disk raises nothing: what does not fit is lost, and counted in `lost`; the file keeps its whole records, and
+    recording goes on once there is room. `failure` says why nothing can be written now. A disk that does not keep what
+    it took ends the recording.
 
     Attributes
     ----------
@@ -140,7 +65,7 @@ class Recorder(Closing):
     """
 
     def __init__(self, path: Path, session: Session, *, tail: Tail | None = None, sync_s: float = SYNC_S) -> None:
-        """Begin a file that must not exist, or continue after the `tail` of an existing one.
+        """Begin a file that must not exist, or continue after the `tail` of an existing one, and cut off the rest.
 
         Raises SettingError if the file exists, OSError as the operating system gives it.
         """
@@ -149,12 +74,24 @@ class Recorder(Closing):
         self.path = path
         self.lost = 0
         self._tail = _begun(path, self.session) if tail is None else tail
-        self._file = AppendedFile(path, self._tail.size, sync_s)
+        self._size = self._synced = self._tail.size
+        # Two threads fail: a write is tried again, a disk that kept nothing is not.
+        self._full: str | None = None
+        self._broken: str | None = None
+        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
+        try:
+            os.ftruncate(self._file, self._size)
+        except OSError:
+            os.close(self._file)
+            raise
+        self._closing = Event()
+        self._thread = Thread(target=self._keep_synced, args=(sync_s,), name="thenar recording", daemon=True)
+        self._thread.start()
         if tail is not None:
             record = layout.session_record(self.session)
-            if not self._file.append(record):
-                self._file.close()
-                raise OSError(self._file.failure)
+            if not self._append(record):
+                self._end()
+                raise OSError(self.failure)
             self._tail.add_bytes(record)
             self._tail.add_session(len(record))
         self._grasp = ""
@@ -165,7 +102,7 @@ class Recorder(Closing):
     @property
     def failure(self) -> str | None:
         """Why nothing can be written now; None while there is no error."""
-        return self._file.failure
+        return self._broken or self._full
 
     @property
     def messages(self) -> int:
@@ -196,9 +133,9 @@ class Recorder(Closing):
 
     def close(self) -> None:
         """Write the summary and close; may wait for the disk, and may be called again."""
-        if self._file.size == self._tail.size:
-            self._file.append(layout.ending(self._tail))
-        self._file.close()
+        if self._size == self._tail.size:
+            self._append(layout.ending(self._tail))
+        self._end()
 
     def _of_frame(self, frame: SwitchFrame | GloveFrame) -> list[_Message]:
         sensors, found = self._sensors, list[tuple[int, bytes]]()
@@ -220,12 +157,58 @@ class Recorder(Closing):
             sequence = tail.counts[channel] & 0xFFFFFFFF
             data += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, sequence, logged, published) + content
             tail.add_message(channel, logged)
-        if written := self._file.append(data):
+        if written := self._append(data):
             tail.add_bytes(data)
             self._tail = tail
         elif self.failure is not None:
             self.lost += len(messages)
         return written
+
+    def _append(self, data: bytes) -> bool:
+        """Append `data` whole and return True; return False if that fails, and when closed."""
+        if self._broken is not None or self._closing.is_set():
+            return False
+        try:
+            written = os.write(self._file, data)
+            while written < len(data):
+                written += os.write(self._file, data[written:])
+        except OSError as reason:
+            self._full = self._sentence(reason)
+            try:
+                # Remove the part of the record that fitted.
+                os.ftruncate(self._file, self._size)
+            except OSError as worse:
+                self._broken = self._sentence(worse)
+            return False
+        self._size += len(data)
+        self._full = None
+        return True
+
+    def _end(self) -> None:
+        """Write everything to the disk and close. May wait for the disk."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        self._thread.join()
+        self._sync()
+        os.close(self._file)
+
+    def _keep_synced(self, every_s: float) -> None:
+        while not self._closing.wait(every_s):
+            self._sync()
+
+    def _sync(self) -> None:
+        size = self._size
+        if size == self._synced or self._broken is not None:
+            return
+        try:
+            os.fdatasync(self._file)
+        except OSError as reason:
+            self._broken = self._sentence(reason)
+        self._synced = size
+
+    def _sentence(self, reason: OSError) -> str:
+        return f"{self.path}: {reason.strerror}: nothing more is written after {self._size} bytes, all of them whole"
 
 
 # Moments that wait for the disk: those of five seconds of the fastest glove.

@@ -7,7 +7,7 @@ from thenar.drivers.i2c.chips import Chip, Reading
 
 from ..harness.wiring import ChipWiring, Harness, SpiWiring
 from ..names import taxel_and_code
-from .scanmap import SCHEMA, Pair, Port, ScanMap, StreamLevel, StreamRead
+from .scanmap import SCHEMA, Pair, Port, ScanMap, StreamRead
 
 # The levels of each taxel: (code, number of the switch) pairs, ascending.
 Levels = Mapping[str, tuple[Pair, ...]]
@@ -92,16 +92,12 @@ def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bo
     on_taxels = {number for pairs in levels.values() for _, number in pairs}
     numbers = {name: number for number, name in enumerate(switch_names) if number not in on_taxels}
     streams = tuple(
-        StreamRead(_places(board.switches, numbers), _levels(tuple(board.taxels), levels)) for board in harness.streams
+        StreamRead(
+            tuple((place, numbers[name]) for place, name in enumerate(stream.switches) if name in numbers),
+            tuple((place, *pair) for place, taxel in enumerate(stream.taxels) for pair in levels.get(taxel, ())),
+        )
+        for stream in harness.streams
     )
     if every_taxel:
         levels = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names}
     return ScanMap(SCHEMA, ports_of(harness, numbers, levels), streams)
-
-
-def _places(names: Sequence[str], numbers: Mapping[str, int]) -> tuple[Pair, ...]:
-    return tuple((place, numbers[name]) for place, name in enumerate(names) if name in numbers)
-
-
-def _levels(taxels: Sequence[str], levels: Levels) -> tuple[StreamLevel, ...]:
-    return tuple((place, code, number) for place, taxel in enumerate(taxels) for code, number in levels.get(taxel, ()))

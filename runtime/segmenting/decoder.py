@@ -65,12 +65,19 @@ class _Sources(msgspec.Struct):
         return self.none if self.from_none >> state & 1 else self.first
 
 
-class _Paths:
-    """The cheapest paths to the newest tick, and the origins of the last `depth` ticks."""
+class Decoder:
+    """Decodes a live stream, with a fixed lag: integers only.
 
-    def __init__(self, model: SegmentModel, depth: int) -> None:
+    After each tick it returns the state of `lag_ticks` ticks ago, on the cheapest path to the newest tick. A later tick
+    may favour another path: a state once returned is not revised.
+    """
+
+    def __init__(self, model: SegmentModel, lag_ticks: int) -> None:
+        """Take a lag, in ticks of the model. Raises SettingError if it is negative."""
+        if lag_ticks < 0:
+            raise SettingError(f"a lag of {lag_ticks} ticks is not possible: use 0 or more")
         K = model.n_types
-        self._none, self.tick = K, -1
+        self._none, self._tick = K, -1
         self._enter, self._direct, self._leave = model.enter, model.direct, model.leave
         self._least_leave = min(model.leave)
         # The extra cost of none over the cheapest type if a type begins after the latter.
@@ -86,12 +93,37 @@ class _Paths:
         self._least, self._alike = model.least, len({*model.least[:K]}) == 1
         self._costs = (_NEVER, _NEVER, _NEVER)
         self._next = _Sources((0, 0), (K, 0), (0, 0), 0)
-        self.sources: deque[_Sources] = deque(maxlen=depth)
-        self.newest = K, 0
+        self._sources: deque[_Sources] = deque(maxlen=lag_ticks)
+        self._newest = K, 0
+        self._model, self._lag = model, lag_ticks
+        self._state, self._segment = K, 0
 
-    def step(self, costs: Sequence[int]) -> None:
+    def push(self, biased_scores: Sequence[int], refused: bool = False) -> Decoded:
+        """Take the scores of the next tick, and whether its frame is refused (for models with a refusal)."""
+        self._step(self._model.costs(biased_scores, refused))
+        tick, newest, begun = self._tick - self._lag, *self._newest
+        if tick < 0:
+            state, start = self._none, 0
+        else:
+            state, start = (newest, begun) if begun <= tick else self._back(tick)
+        if state != self._state:
+            self._segment += state != self._none
+            self._state = state
+        return Decoded(state, self._segment, tick, start, newest, begun)
+
+    def finish(self) -> list[int]:
+        """Return the states of the ticks that the lag still holds back, on the cheapest path to the newest."""
+        number, found = min(self._lag, self._tick + 1), list[int]()
+        state, start = self._newest
+        while len(found) < number:
+            found += [state] * (min(self._tick + 1 - start, number) - len(found))
+            if len(found) < number:
+                state, start = self._sources[start - self._tick - 1].of(state)
+        return found[::-1]
+
+    def _step(self, costs: Sequence[int]) -> None:
         """Take the next tick, which costs the states `costs`."""
-        self.tick = tick = self.tick + 1
+        self._tick = tick = self._tick + 1
         sums, none, leave, least_leave = self._sums, self._none, self._leave, self._least_leave
         self._best, self._starts = best, starts = self._best[:], self._starts[:]
         past, durations = self._past, self._least
@@ -126,10 +158,10 @@ class _Paths:
         if begun < best[none]:
             best[none], starts[none] = begun, tick
         sums[none] = total = total + costs[none] + self._stay[none]
-        self.newest = (none, starts[none]) if best[none] + total < least else (least_in, starts[least_in])
+        self._newest = (none, starts[none]) if best[none] + total < least else (least_in, starts[least_in])
         row, none_ends = past[-durations[none]]
         self._costs = first, row[none] + total, ending
-        self.sources.append(self._next)
+        self._sources.append(self._next)
         if self._alike:
             first_of, ending_of = (first_in, ends[first_in]), (ending_in, ends[ending_in])
         else:
@@ -149,57 +181,12 @@ class _Paths:
         least = [min(gap + enter, direct) for enter, direct in zip(self._enter, self._direct, strict=True)]
         return first, least, sum(1 << k for k, own in enumerate(self._gaps) if gap < own)
 
-    def back(self, tick: int) -> tuple[int, int]:
+    def _back(self, tick: int) -> tuple[int, int]:
         """Return the state of an earlier tick on the cheapest path to the newest, and when its segment began."""
-        state, start = self.newest
+        state, start = self._newest
         while start > tick:
-            state, start = self.sources[start - self.tick - 1].of(state)
+            state, start = self._sources[start - self._tick - 1].of(state)
         return state, start
-
-    def states(self, number: int) -> list[int]:
-        """Return the states of the last `number` ticks on the cheapest path to the newest."""
-        found: list[int] = []
-        state, start = self.newest
-        while len(found) < number:
-            found += [state] * (min(self.tick + 1 - start, number) - len(found))
-            if len(found) < number:
-                state, start = self.sources[start - self.tick - 1].of(state)
-        return found[::-1]
-
-
-class Decoder:
-    """Decodes a live stream, with a fixed lag: integers only.
-
-    After each tick it returns the state of `lag_ticks` ticks ago, on the cheapest path to the newest tick. A later tick
-    may favour another path: a state once returned is not revised.
-    """
-
-    __slots__ = ("_lag", "_model", "_paths", "_segment", "_state")
-
-    def __init__(self, model: SegmentModel, lag_ticks: int) -> None:
-        """Take a lag, in ticks of the model. Raises SettingError if it is negative."""
-        if lag_ticks < 0:
-            raise SettingError(f"a lag of {lag_ticks} ticks is not possible: use 0 or more")
-        self._model, self._lag, self._paths = model, lag_ticks, _Paths(model, lag_ticks)
-        self._state, self._segment = model.n_types, 0
-
-    def push(self, biased_scores: Sequence[int], refused: bool = False) -> Decoded:
-        """Take the scores of the next tick, and whether its frame is refused (for models with a refusal)."""
-        paths = self._paths
-        paths.step(self._model.costs(biased_scores, refused))
-        tick, newest, begun = paths.tick - self._lag, *paths.newest
-        if tick < 0:
-            state, start = self._model.n_types, 0
-        else:
-            state, start = (newest, begun) if begun <= tick else paths.back(tick)
-        if state != self._state:
-            self._segment += state != self._model.n_types
-            self._state = state
-        return Decoded(state, self._segment, tick, start, newest, begun)
-
-    def finish(self) -> list[int]:
-        """Return the states of the ticks that the lag still holds back, on the cheapest path to the newest."""
-        return self._paths.states(min(self._lag, self._paths.tick + 1))
 
 
 class Segment(msgspec.Struct, frozen=True):
@@ -245,7 +232,9 @@ class LiveSegments:
         """
         since_us = now_us - self._last_us
         if self._next_us is not None and not 0 <= since_us <= GRACE_US:
-            self._begin_afresh()
+            self._segments = self.newest.number - (self.newest.state == "forming")
+            self._decoder, self._next_us, self._tick, self._set = Decoder(self._model, self._lag), None, -1, []
+            self._shown, self.newest = None, Segment(number=self._segments)
         if scores is None:
             self._unread = True
             return self.newest
@@ -260,12 +249,6 @@ class LiveSegments:
             self._next_us += self.tick_us
         self._scores = scores, refused
         return self.newest
-
-    def _begin_afresh(self) -> None:
-        newest = self.newest
-        self._segments = newest.number - (newest.state == "forming")
-        self._decoder, self._next_us, self._tick, self._set = Decoder(self._model, self._lag), None, -1, []
-        self._shown, self.newest = None, Segment(number=self._segments)
 
     def _push(self, scores: Sequence[int], refused: bool) -> None:
         found, none = self._decoder.push(scores, refused), self._model.n_types
@@ -284,8 +267,5 @@ class LiveSegments:
         if of == none:
             self.newest = Segment(number=number)
         else:
-            self.newest = Segment(state, number, of, self._grasps[of], self._time_us(start))
-
-    def _time_us(self, tick: int) -> int:
-        first, time_us = next((each for each in reversed(self._set) if each[0] <= tick), self._set[0])
-        return time_us + (tick - first) * self.tick_us
+            first, time_us = next((each for each in reversed(self._set) if each[0] <= start), self._set[0])
+            self.newest = Segment(state, number, of, self._grasps[of], time_us + (start - first) * self.tick_us)

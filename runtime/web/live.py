@@ -27,8 +27,8 @@ from .server import Server, message
 _MOST_CHANGES = 6_000
 # A time without moments is unknown. A source is silent after half a second, or after three of its periods.
 _GAP_US, _SILENT_US, _PERIODS = 1_000_000, 500_000, 3
-# What is said of the glove is repeated once a second, and is not known when it was not.
-_LASTS_S = 3
+# The glove is looked at so often; what is said of it is repeated once a second, and is not known when it was not.
+_LOOK_US, _LASTS_S = 200_000, 3
 # What a timeline shows of a prediction: its time, the announced type, "degraded" or "unknown" health, and the segment's
 # type and beginning.
 Change = tuple[int, str, str, str, int | None]
@@ -64,7 +64,7 @@ class LivePage:
         self._past: deque[Change] = deque(maxlen=_MOST_CHANGES) if after is None else after._past
         self._until_us: int = 0 if after is None else after._until_us
         # The devices that are lost, and since when; and what was said of the glove.
-        self._lost, self._said = dict[str, str](), ("", "")
+        self._lost, self._said, self._due_us = dict[str, str](), ("", ""), 0
         periods = glove.sources.switch_period_us, glove.sources.glove_period_us
         self._silent_us = max(_SILENT_US, *(_PERIODS * (period or 0) for period in periods))
         manifest = glove.system.build.manifest
@@ -89,10 +89,11 @@ class LivePage:
             state = "not connected" if known is None else f"lost since {_clock(0)}"
             self._health, self._lost = health, {name: self._lost.get(name, state) for name in gone}
             self.server.publish("health", partial(message, "health", health))
-        said = self._state(grasp)
-        if health is not known or said != self._said:
-            self._said = said
-            self.server.publish("glove", partial(self._glove_message, *said))
+        if health is not known or grasp.time_us >= self._due_us:
+            said, self._due_us = self._state(grasp), grasp.time_us + _LOOK_US
+            if health is not known or said != self._said:
+                self._said = said
+                self.server.publish("glove", partial(self._glove_message, *said))
 
     def _state(self, grasp: LiveGrasp) -> tuple[str, str]:
         """Return how the glove is, "good", "warn" or "bad", and in words."""

@@ -30,7 +30,7 @@ from ..recording.session import Label, Session
 from .live import Change, FrameText, build_message, change_of
 from .server import message
 
-# Moments are kept at this interval; the overview holds so many changes of each build, and so many labels.
+# The interval of moments that are kept; the most changes of a build, or labels, that the overview holds.
 _SAMPLE_US, _MOST_CHANGES = 20_000, 200_000
 _PERIODS_OF = 20_000
 # Of one reply: entries of each list of the overview, moments, and bytes of these.
@@ -122,7 +122,7 @@ class Replay(Closing):
             raise SettingError(f"a page can ask for the overview or for moments of a recording, not {str(do)[:20]!r}")
         count = 3 if do == "moments" else len(self._builds) + 1
         if not isinstance(numbers, list | tuple) or len(numbers) != count or not all(map(_is_number, numbers)):
-            raise SettingError(f"for the {do} of a recording, a page must send {count} whole numbers of at most 62 bits")
+            raise SettingError(f"for the {do} of a recording, a page must send {count} whole numbers below 2^62")
         return self._moments(*numbers) if do == "moments" else self._overview(numbers)
 
     def _overview(self, have: Sequence[int]) -> bytes:
@@ -176,6 +176,8 @@ class Replay(Closing):
         except OSError as wrong:
             self._faults.append(f"{path.name} is shown up to here: {wrong.strerror}")
         self._faults += [fault.message for fault in self._reader.faults()]
+        if max(map(len, (*self._changes, self._truth))) == _MOST_CHANGES:
+            self._faults.append(f"the timeline ends at {_MOST_CHANGES} changes of the prediction, or labels")
         self._scanned.set()
 
     def _take(self, entry: Entry, moments: Sequence[Moment | None]) -> Moment | None:

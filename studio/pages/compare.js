@@ -41,7 +41,7 @@ const ask = openPage({
   },
   exported: ({ said, address, name }) => {
     say($("exported"), said);
-    $("download").hidden = !address;
+    $("download").hidden = false;
     const link = $("download").firstChild;
     link.href = address;
     link.download = name;
@@ -62,6 +62,8 @@ function fill(menu, members, usual) {
 }
 
 function listSets(members, aside) {
+  // Boxes that stay keep the focus.
+  if (String(members.map(({ id }) => id)) === String(sets.map(({ id }) => id))) return;
   const unticked = new Set(sets.filter(({ box }) => !box.checked).map(({ id }) => id));
   const before = sets.map(({ id }) => id);
   sets = members.map(({ id, name }) => {

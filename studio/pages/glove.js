@@ -58,6 +58,7 @@ function showGlove(message) {
   buttons = about.names.map((name, sensor) => {
     const button = document.createElement("button");
     button.type = "button";
+    button.className = "plain";
     button.textContent = name;
     button.addEventListener("click", () => choose(sensor));
     return button;
@@ -193,6 +194,7 @@ function showStep({ step, what, problems, faults, keys }) {
   const made = words.map(([key, said]) => {
     const button = document.createElement("button");
     button.type = "button";
+    button.className = key === words[0][0] ? "" : "plain";
     button.dataset.key = key;
     button.textContent = said;
     button.addEventListener("click", () => ask("step", { name: key }));

@@ -2,6 +2,7 @@
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
+import { tag, typeStyles } from "./types.js";
 import { list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
@@ -15,6 +16,9 @@ let drawn = null; // the message on the glove's hand
 let hand = null;
 let pictured = null; // the grasp type that is drawn
 let listed = false; // whether the project has an objects.toml
+let seen = null; // the trial that is shown
+let recorded = ""; // the set of the last recording
+let edits = {}; // what its trials were made, by their number; "": left out
 let edited = false; // whether the person's name was typed here
 
 const ask = openPage({
@@ -48,12 +52,19 @@ const ask = openPage({
     hand = null;
   },
   recorded: ({ trial, grasp, thing, closed, pressed, values }) => {
+    seen = trial;
+    $("type").value = grasp;
     $("seen").hidden = false;
     say($("seen-heading"), `Trial ${trial}: ${grasp}, ${thing}`);
     if (drawn) hand ??= drawHand($("hand"), drawn);
     hand?.setClosed(closed);
     hand?.setTaxels(pressed);
     hand?.setPose(values);
+  },
+  relabelled: ({ set, trials }) => {
+    recorded = set;
+    edits = trials;
+    markTrials();
   },
   finished: ({ set, size, warnings, done, total }) => {
     $("end").hidden = !set || stage !== "over";
@@ -131,6 +142,7 @@ function showKeys(keys) {
   const buttons = words.map(([key, what]) => {
     const button = document.createElement("button"), letter = document.createElement("kbd");
     button.type = "button";
+    button.className = key === words[0][0] ? "" : "plain";
     button.dataset.key = key;
     letter.textContent = LETTERS[key];
     button.append(what, letter);
@@ -151,7 +163,9 @@ document.addEventListener("keydown", (event) => {
   ask("key", { name: found[0] });
 });
 
-function showTrials({ trials, accuracy }) {
+function showTrials({ trials, types, accuracy }) {
+  const styles = typeStyles(types);
+  $("type").replaceChildren(...types.filter((type) => type !== "none").map((type) => new Option(type, type)));
   $("so-far").hidden = !trials.length;
   $("seen").hidden = true;
   say($("accuracy"), accuracyWords(accuracy));
@@ -162,13 +176,24 @@ function showTrials({ trials, accuracy }) {
     const item = document.createElement("li"), button = document.createElement("button");
     item.dataset.trial = trial;
     button.type = "button";
-    button.textContent = `${trial}: ${grasp}`;
+    button.className = "plain";
+    button.append(`${trial} `, tag(styles, grasp), document.createElement("span"));
     button.title = thing;
     button.addEventListener("click", () => ask("recorded", { trial }));
     item.append(button);
     strip.append(item);
   }
+  markTrials();
   $("strip-scroll").scrollLeft = strip.scrollWidth;
+}
+
+/** Say what became of the trials of the last recording, and let it be changed. */
+function markTrials() {
+  $("relabel").hidden = !recorded;
+  for (const item of $("strip").children) {
+    const change = recorded ? edits[item.dataset.trial] : undefined;
+    say(item.querySelector("button").lastElementChild, change === undefined ? "" : change ? ` → ${change}` : ", left out");
+  }
 }
 
 function accuracyWords(accuracy) {
@@ -190,4 +215,10 @@ $("form").addEventListener("submit", (event) => {
     trial: Number($("none").checked),
   });
 });
+$("relabel").addEventListener("submit", (event) => {
+  event.preventDefault();
+  ask("relabel", { trial: seen, name: $("type").value });
+});
+$("drop").addEventListener("click", () => ask("relabel", { trial: seen, name: "" }));
+$("undo").addEventListener("click", () => ask("undo"));
 $("train").addEventListener("click", () => ask("train", { sensors: [...Array(sensors).keys()] }));

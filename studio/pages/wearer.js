@@ -67,18 +67,25 @@ function show({ wearer, base, build, types, sets: members, glove, record, undo }
   say($("plan"), glove ? `Two trials of each of ${types.length} types; three if you add one.` : "The project has no glove.toml: connect a glove first.");
   for (const one of $("record").elements) one.disabled = !glove;
   say($("record-command"), record);
+  listSets(members);
+  say($("no-sets"), members.length ? "" : `no set holds only trials of ${wearer}`);
+  choose();
+}
+
+function listSets(members) {
+  // Boxes that stay keep the focus.
+  if (JSON.stringify(members) === JSON.stringify(sets.map(({ member }) => member))) return;
   const unticked = new Set(sets.filter(({ box }) => !box.checked).map(({ id }) => id));
-  sets = members.map(({ id, name, size }) => {
+  sets = members.map((member) => {
+    const { id, name, size } = member;
     const label = document.createElement("label"), box = document.createElement("input");
     box.type = "checkbox";
     box.checked = !unticked.has(id);
     box.addEventListener("change", choose);
     label.append(box, `${name}: ${size}`);
-    return { id, box, label };
+    return { id, box, label, member };
   });
-  say($("no-sets"), members.length ? "" : `no set holds only trials of ${wearer}`);
   $("sets").replaceChildren($("sets").firstElementChild, $("no-sets"), ...sets.map(({ label }) => label));
-  choose();
 }
 
 const ticked = () => sets.filter(({ box }) => box.checked).map(({ id }) => id);

@@ -5,8 +5,11 @@ import re
 import shlex
 import shutil
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -206,9 +209,24 @@ def test_firmware_is_written_as_its_command_does(browser: Browser, project: Stud
     browser.click("firmware")
     browser.wait(lambda: "generic" in browser.text("exported"))
     made = {path.name: path.read_bytes() for path in Path(command[-1]).rglob("*") if path.is_file()}
+    link = browser.driver.find_element(By.CSS_SELECTOR, "#download a")
+    with urlopen(str(link.get_attribute("href"))) as answer, ZipFile(BytesIO(answer.read())) as archive:
+        packed = {Path(name).name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+    assert packed == made
     again = folder.parent / "again"
     assert run([*command[1:-1], str(again)]) == 0
     assert made == {path.name: path.read_bytes() for path in again.rglob("*") if path.is_file()}
+
+
+def test_two_browsers_do_not_move_each_other(browser: Browser, project: Studio) -> None:
+    """What another one compares is not shown: here, the same builds in the other order."""
+    begun(browser, project)
+    chosen = [str(browser.script("return document.getElementById(arguments[0]).value", one)) for one in "ba"]
+    request = {"do": "compare", "ids": [*chosen, *ids(project, "set").values()]}
+    assert asked(project, request, "compare")["ids"] == request["ids"]
+    browser.click("report")
+    browser.wait(lambda: browser.text("exported"))
+    assert not browser.driver.find_element(By.ID, "result").is_displayed()
 
 
 @pytest.mark.parametrize("width", [400, 1400])

@@ -437,4 +437,4 @@ def frames_later(browser: Browser, frames: int, pixels: int) -> None:
             else done();
         };
         requestAnimationFrame(step);"""
-    browser.driver.execute_async_script(script, frames, pixels)  # type: ignore[no-untyped-call]
+    browser.driver.execute_async_script(script, frames, pixels)

@@ -151,7 +151,7 @@ def test_a_recording_is_shown_on_the_same_page_with_one_build_or_two(
     browser.click("steer-open")
     browser.wait(lambda: "of 6 labelled trials" in browser.text("rates"))
     assert browser.text("rates").startswith("few recognises ")
-    browser.wait(lambda: browser.text("beside").lstrip("✗ ").startswith("more: "))
+    browser.wait(lambda: browser.text("other").lstrip("✗ ").startswith("more: "))
     assert browser.script("return document.documentElement.scrollWidth") <= width
     assert browser.axe() == []
     # The link with its time leads here again.
@@ -251,6 +251,6 @@ def test_a_page_names_members_by_id_alone_and_its_requests_are_bounded(studio: S
         # However many recordings pages ask for, a few stay open.
         for name in range(6):
             (project / f"rec{name}.mcap").write_bytes((project / "rec.mcap").read_bytes())
-        for member in opened.project.members("recording"):
-            assert reply(do="replay", ids=[member.id, few])["name"] == member.name
+        for one in opened.project.members("recording"):
+            assert reply(do="replay", ids=[one.id, few])["name"] == one.name
     assert json.loads((project / "studio.json").read_text())["build"] == "few"

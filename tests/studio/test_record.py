@@ -15,7 +15,7 @@ from websockets.typing import Origin
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.runtime.recording.guide import read_journal
-from thenar.studio import Studio
+from thenar.studio import Project, Studio
 
 from ..browser import Browser
 
@@ -77,12 +77,23 @@ def stage(browser: Browser, key: str) -> bool:
     return bool(browser.script("return document.querySelector(`#keys [data-key=${arguments[0]}]`)", key))
 
 
+def captured(browser: Browser) -> bool:
+    """Return whether the grasp is captured; on a busy machine, where frames were late, begin the countdown anew."""
+    return bool(
+        browser.script(
+            "const said = document.getElementById('standing').textContent;"
+            "if (said.startsWith('not captured')) document.querySelector('#keys [data-key=accept]')?.click();"
+            "return said.startsWith('captured: ')"
+        )
+    )
+
+
 def hold(browser: Browser, board: BoardSender) -> None:
     """Hold the grasp that the page asks for, until it is captured."""
     # No two trials are the same.
     angle = 50 + 7 * int(browser.text("place").split(" ")[0])
     board.show(HELD[browser.text("prompt").split(" ")[0]] | {"j1": angle})
-    browser.wait(lambda: browser.text("standing").startswith("captured: "))
+    browser.wait(lambda: captured(browser))
 
 
 def open_record(browser: Browser, studio: Studio, **how: int | str) -> None:
@@ -94,7 +105,8 @@ def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
     browser: Browser, studio: Start, folder: Path, board: BoardSender
 ) -> None:
     """Six trials; every second one is accepted with Enter, which the button has the focus for."""
-    open_record(browser, studio(None))
+    page = studio(None)
+    open_record(browser, page)
     begin(browser)
     browser.wait(lambda: stage(browser, "accept"))
     assert browser.script("return document.activeElement.dataset.key") == "accept"
@@ -133,6 +145,20 @@ def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
     assert "6 of 6 trials are done" in browser.text("size")
     assert browser.texts("#warnings li")
     assert browser.axe() == []
+    strip = browser.texts("#strip button")
+    browser.wait(lambda: browser.driver.find_element(By.ID, "type").is_displayed())
+    Select(browser.driver.find_element(By.ID, "type")).select_by_value("Tip" if grasp != "Tip" else "Lat")
+    browser.driver.find_element(By.CSS_SELECTOR, "#relabel [type=submit]").click()
+    browser.wait(lambda: " → " in browser.texts("#strip button")[0])
+    browser.click("drop")
+    browser.wait(lambda: "left out" in browser.texts("#strip button")[0])
+    project = Project(folder, page.project.hand())
+    assert len(project.grasp_set().rows(project.grasp_set().grasps == grasp)) == 1
+    browser.picture("record-end")
+    for _ in range(2):
+        browser.click("undo")
+    browser.wait(lambda: browser.texts("#strip button") == strip)
+    assert len(project.grasp_set()) == 6
     browser.wait(lambda: not browser.script("return document.getElementById('train').disabled"))
     browser.click("train")
     browser.wait(lambda: browser.text("build-heading") == "Trained: build")
@@ -210,6 +236,7 @@ def test_it_can_be_used_by_everybody(
         ({"do": "continue", "id": "../glove.toml"}, "the project has no recording"),
         ({"do": "key", "name": "explode"}, "there is no key"),
         ({"do": "recorded", "trial": 99}, "was not recorded"),
+        ({"do": "relabel", "trial": 1, "name": "Tip"}, "nothing was recorded here yet"),
     ],
 )
 def test_what_no_page_sends_is_refused(studio: Start, folder: Path, asked: dict[str, object], why: str) -> None:

@@ -317,7 +317,8 @@ class Posed {
     this.forearm.setAttribute("d", line(pose.forearm, false));
     this.palm.setAttribute("d", line(pose.palm, true));
     for (const [digit, parts] of Object.entries(this.digits)) {
-      for (const part of parts) part.setAttribute("d", line(pose.chains[digit], false));
+      const bones = line(pose.chains[digit], false);
+      for (const part of parts) part.setAttribute("d", bones);
     }
     // A part of the hand is marked while one of its joints is lost.
     const lost = new Set(this.joints.filter((_, at) => this.values[at] === null).map(({ digit }) => digit));

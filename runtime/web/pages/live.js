@@ -13,6 +13,13 @@ const timeline = new Timeline($("timeline"), {
   toggle: () => (timeline.live ? timeline.seek(timeline.at === null ? timeline.last - 1 : null) : replay.toggle()),
 });
 const replay = new Replay(view, timeline, (what, numbers) => ask(what, { numbers, ids }));
+const run = {
+  build: begin,
+  hand: (hand) => view.setHand(hand),
+  past: ({ changes, until_us }) => timeline.past(changes, until_us),
+  frame,
+  health: (report) => view.health(report),
+};
 let build = null;
 let studio = null; // its controls
 
@@ -22,10 +29,10 @@ const ask = openPage({
     if (ids.length) ask("replay", { ids });
   },
   closed: () => view.state.link(false),
-  ...(ids.length ? {} : { build: begin, hand: (hand) => view.setHand(hand), past, frame, health: (report) => view.health(report) }),
+  ...(ids.length ? {} : run),
   replay: (recording) => {
     for (const one of document.querySelectorAll("[data-of]")) one.hidden = one.dataset.of !== "recording";
-    $("beside").hidden = recording.builds.length < 2;
+    $("other").hidden = recording.builds.length < 2;
     begin(recording, false);
     view.setHand(recording.hand);
     replay.begin(recording);
@@ -44,15 +51,11 @@ function begin(about, live = true) {
   view.build(about, live);
 }
 
-function past({ changes, until_us }) {
-  timeline.past(changes, until_us);
-}
-
 function frame(message) {
   const { time_us, grasp, health, state, segment_type, segment_us } = message;
   const began = state === "held" || state === "releasing" ? segment_us : null;
   const trouble = health === "degraded" || health === "unknown" ? health : "";
-  timeline.follow(time_us, [time_us, grasp, trouble, began === null ? "" : segment_type, began], message.unix_us);
+  timeline.follow([time_us, grasp, trouble, began === null ? "" : segment_type, began], message.unix_us);
   view.take(message);
 }
 

@@ -13,7 +13,6 @@ export class Replay {
   #labels = new Map(); // spans by the number of their trial
   #counts = [];
   #moments = { from: 0, to: -1, frames: [] };
-  #next = null; // the moments after these
   #asking = false; // for moments
   #asked = 0;
   #playing = false;
@@ -34,7 +33,7 @@ export class Replay {
     this.#timeline.tracks = builds.map((name) => new Track(builds.length > 1 ? name : ""));
     this.#labels.clear();
     this.#counts = [...builds, ""].map(() => 0);
-    [this.#asking, this.#next] = [false, null];
+    this.#asking = false;
     this.#ask("overview", this.#counts);
     this.moved();
   }
@@ -68,9 +67,7 @@ export class Replay {
   /** Take moments. */
   moments({ from_us, to_us, frames }) {
     this.#asking = false;
-    const got = { from: from_us, to: to_us, frames };
-    if (this.#playing && from_us === this.#moments.to + 1) this.#next = got;
-    else [this.#moments, this.#next] = [got, null];
+    this.#moments = { from: from_us, to: to_us, frames };
     this.#show();
     if (frames.length) this.#fetch(); // or it was not read yet
   }
@@ -102,7 +99,6 @@ export class Replay {
     requestAnimationFrame((next) => this.#play(next));
     const { at, last } = this.#timeline, us = Math.min(at + (now - this.#before) * 1000 * this.#speed, last);
     this.#before = now;
-    if (this.#next && us > this.#moments.to) [this.#moments, this.#next] = [this.#next, null];
     // It waits for moments that have not come yet.
     if (this.#covers(us)) this.#timeline.seek(us);
     if (at >= last && this.#share === 1) this.toggle();
@@ -124,15 +120,15 @@ export class Replay {
     const label = spanAt(truth, at)?.name ?? null, [, other] = tracks;
     this.#view.take(frame);
     const bad = label !== null && differs(frame.grasp, label);
-    say($("truth"), label === null ? "Truth: no label" : bad ? `✗ Truth: ${label}, predicted: ${frame.grasp}` : `Truth: ${label}`);
+    say($("truth"), label === null ? "Truth: no label" : bad ? `✗ Truth: ${label}, announced: ${frame.grasp}` : `Truth: ${label}`);
     for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
     if (!other) return;
     const second = spanAt(other.announced, at)?.name ?? "nothing", wrong = label !== null && differs(second, label);
-    say($("beside"), `${wrong ? "✗ " : ""}${other.name}: ${second}`);
-    $("beside").classList.toggle("wrong", wrong);
+    say($("other"), `${wrong ? "✗ " : ""}${other.name}: ${second}`);
+    $("other").classList.toggle("wrong", wrong);
   }
 
-  // Ask for the moments at the cursor, or for those after the present ones; one request at a time.
+  // Ask for the moments from the cursor on; one request at a time.
   #fetch() {
     if (this.#asking || this.#missing() === null) return;
     this.#asking = true;
@@ -143,13 +139,11 @@ export class Replay {
     }, Math.max(ASK_MS - (performance.now() - this.#asked), 0));
   }
 
-  // The time from which moments are missing now.
+  // The time from which moments are missing now, or will be soon.
   #missing() {
     const { at, last } = this.#timeline, { to } = this.#moments;
-    if (at === null) return null;
-    if (!this.#covers(at)) return at;
-    const soon = this.#playing && !this.#next && to < last && at + (AHEAD_US / 2) * this.#speed > to;
-    return soon ? to + 1 : null;
+    const soon = this.#playing && to < last && at + (AHEAD_US / 2) * this.#speed > to;
+    return at !== null && (soon || !this.#covers(at)) ? at : null;
   }
 
   // Say how many labelled trials each build recognises: a trial is right if its type was announced for longest.

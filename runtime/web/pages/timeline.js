@@ -125,17 +125,10 @@ export class Timeline {
   }
 
   /** Take a moment of a run. */
-  follow(time, change, unixUs) {
-    const [track] = this.tracks;
-    // Another host has another clock; a moment that is a little older was passed by the changes sent before it.
-    if (track.untilUs !== null && time < track.untilUs) {
-      if (track.untilUs - time < 1_000_000) return;
-      this.tracks = [new Track()];
-      this.first = this.at = null;
-      this.follow(time, change, unixUs);
-      return;
-    }
-    if (track.untilUs !== null && time - track.untilUs > 1_000_000) track.end();
+  follow(change, unixUs) {
+    const [time] = change, track = this.#runUntil(time), silent = time - track.untilUs > 1_000_000;
+    if (track.untilUs !== null && time < track.untilUs) return; // changes that were sent before passed it
+    if (track.untilUs !== null && silent) track.end();
     track.take(change);
     for (const lane of [track.announced, track.segments, track.health]) {
       const gone = lane.findIndex((span, at) => span.to > time - KEPT_US && at >= lane.length - MOST_SPANS);
@@ -148,20 +141,23 @@ export class Timeline {
     this.draw();
   }
 
-  /** Take the past of a run, of which the page may know more already. */
+  /** Take the past of a run, of which the page may know more, or a part, already. */
   past(changes, until) {
-    if (!changes.length) return;
-    const [known] = this.tracks, track = new Track(), [[begin]] = changes;
-    for (const change of changes) track.take(change);
+    const track = this.#runUntil(until), known = track.untilUs ?? -1, news = changes.filter(([time]) => time > known);
+    if (!news.length) return;
+    if (known >= 0) track.end();
+    for (const change of news) track.take(change);
     track.untilUs = until;
-    if (known.untilUs !== null && known.untilUs <= until) {
-      for (const lane of ["announced", "segments", "health"]) {
-        const older = known[lane].filter(({ from }) => from < begin).map((span) => ({ ...span, to: Math.min(span.to, known.untilUs, begin) }));
-        track[lane].unshift(...older);
-      }
+    this.first ??= news[0][0];
+  }
+
+  // The track of the run. A clock that goes back is another host's.
+  #runUntil(time) {
+    if (this.tracks[0].untilUs - time > 1_000_000) {
+      this.tracks = [new Track()];
+      this.first = this.at = null;
     }
-    this.tracks = [track];
-    this.first = Math.min(track.announced[0]?.from ?? begin, begin);
+    return this.tracks[0];
   }
 
   /** Take the span of a recording and where its predictions differ from the labels. */
@@ -185,7 +181,7 @@ export class Timeline {
     this.draw();
   }
 
-  /** Return what is known at the cursor, in words. */
+  /** The lanes at the cursor, in words. */
   get reading() {
     if (this.last === null) return this.live ? "no frame yet" : "not read yet";
     const at = this.at ?? this.last, parts = [];

@@ -30,7 +30,7 @@ export function typeStyles(names) {
   return styles;
 }
 
-/** Return an element that shows a type's code on its colour; what it is called stands beside it. */
+/** Return an element that shows a type's code on its colour, for a place next to its name. */
 export function chip({ code, colour, ink }) {
   const made = document.createElement("span");
   made.className = "chip";

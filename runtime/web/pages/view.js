@@ -169,24 +169,15 @@ export class View {
     this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
   }
 
-  #bars(frame) {
-    const { probabilities } = frame;
-    for (const [grasp, { row, full }] of this.rows) {
-      const share = probabilities?.[this.classes.indexOf(grasp)] ?? (grasp === frame.grasp ? frame.probability : 0);
-      full.style.transform = `scaleX(${share})`;
-      if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
-      else row.removeAttribute("aria-current");
-    }
-  }
-
   #numbers(frame) {
     clearTimeout(this.later);
     this.later = null;
     this.words = performance.now();
-    this.#bars(frame);
-    for (const [grasp, { share }] of this.rows) {
-      const at = this.classes.indexOf(grasp);
-      const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
+    for (const [grasp, { row, full, share }] of this.rows) {
+      const value = frame.probabilities?.[this.classes.indexOf(grasp)] ?? (grasp === frame.grasp ? frame.probability : null);
+      full.style.transform = `scaleX(${value ?? 0})`;
+      if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
+      else row.removeAttribute("aria-current");
       say(share, value === null ? "–" : `${(100 * value).toFixed(value > 0.9995 || value < 0.0005 ? 0 : 1)} %`);
     }
     const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)}\u00a0% in this frame`;

@@ -12,11 +12,10 @@ from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to
 from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import (
     GROUP_SIZE,
+    Extremes,
     balance,
     finest_scale,
     quantise,
-    reach,
-    span,
 )
 from thenar.runtime.model.tables import ScoreTables
 
@@ -29,7 +28,7 @@ def test_balancing_changes_no_score_and_never_coarsens(seed: int, joints: int) -
     balanced = balance(tables)
     bits, codes = make_rows(seed, joints=joints)
     assert np.allclose(balanced.scores(bits, codes), tables.scores(bits, codes), rtol=0, atol=1e-11)
-    assert reach(balanced, 1.0, whole=False) <= reach(tables, 1.0, whole=False) * (1 + 1e-12)
+    assert Extremes(balanced).reach(1.0, whole=False) <= Extremes(tables).reach(1.0, whole=False) * (1 + 1e-12)
 
 
 def test_a_bias_that_the_joints_have_room_for_is_gone() -> None:
@@ -71,9 +70,13 @@ def test_the_next_finer_scale_would_not_do(seed: int, shape: tuple[int, int], en
     tables = balance(collapse(make_stumps(seed, switches=switches, joints=joints), switches))
     scale = finest_scale(tables, 32767, 2**entry_bits - 1)
     finer = float(np.nextafter(scale, np.inf))
-    assert reach(tables, scale) <= 32767
-    assert span(tables, scale) <= 2**entry_bits - 1
-    assert reach(tables, finer) > 32767 or span(tables, finer) > 2**entry_bits - 1 or finer >= FINEST_SCALE
+    assert Extremes(tables).reach(scale) <= 32767
+    assert Extremes(tables).span(scale) <= 2**entry_bits - 1
+    assert (
+        Extremes(tables).reach(finer) > 32767
+        or Extremes(tables).span(finer) > 2**entry_bits - 1
+        or finer >= FINEST_SCALE
+    )
 
 
 @given(seed=seeds)
@@ -92,14 +95,14 @@ def test_the_guarantee_is_the_same_in_coarser_steps(seed: int) -> None:
 def test_switches_count_together_only_within_five(apart: int, together: int) -> None:
     rows = np.zeros((60, 2))
     rows[[5, 5 + apart]] = [5.0, -5.0]
-    assert span(ScoreTables.of(np.zeros(2), rows, (), ()), 3.0) == 15 * together
+    assert Extremes(ScoreTables.of(np.zeros(2), rows, (), ())).span(3.0) == 15 * together
 
 
 def test_a_joint_spans_from_its_least_row_to_its_greatest_and_zero() -> None:
     rows = np.array([[-2.0, 1.0], [1.0, 2.0], [0.0, 6.5]])
     tables = ScoreTables.of(np.array([9.0, -9.0]), np.zeros((0, 2)), (np.array([3, 9], np.uint16),), (rows,))
-    assert span(tables, 1.0) == 6
-    assert span(tables, 2.0) == 13
+    assert Extremes(tables).span(1.0) == 6
+    assert Extremes(tables).span(2.0) == 13
 
 
 def test_tables_of_zeros_and_of_no_joint_stay_so() -> None:
@@ -107,7 +110,7 @@ def test_tables_of_zeros_and_of_no_joint_stay_so() -> None:
     assert (integers.scale, integers.bound) == (1.0, 0)
     bias_alone = ScoreTables.of(np.array([3.0, -3.0]), np.zeros((6, 2)), (), ())
     assert quantise(bias_alone, *make_rows(joints=0), entry_bits=8).bias.tolist() == [32767, -32767]
-    assert span(ScoreTables.of(np.ones(2), np.zeros((0, 2)), (), ()), 1.0) == 0
+    assert Extremes(ScoreTables.of(np.ones(2), np.zeros((0, 2)), (), ())).span(1.0) == 0
 
 
 widths = st.sampled_from([4, 8, 12, 16])

@@ -16,20 +16,12 @@ from thenar.runtime.policy import Policy
 from thenar.runtime.web.live import LivePage, shell_message
 from thenar.runtime.web.server import Server
 
-from ...browser import Browser as BareBrowser
+from ...browser import Browser
 from ..conftest import on_bench
 
 PATIENCE_S = 30
 # The answer is the candidate of each frame.
 FRANK = Policy(lead=0.0, dwell_us=0)
-
-
-class Browser(BareBrowser):
-    """A browser, with one live page open."""
-
-    def axe(self, *impacts: str) -> list[str]:
-        """Return what axe-core finds of serious and critical faults: the rule, and where."""
-        return super().axe(*(impacts or ("serious", "critical")))
 
 
 @pytest.fixture(scope="module")

@@ -210,6 +210,30 @@ def test_a_new_build_and_a_new_server_go_on_with_the_past(page: Callable[..., Ru
     browser.log()  # of the server that is gone
 
 
+# The numbers of spans, and the seconds that they reach back, after so many changes of which each lasts for so long.
+_KEPT = """const [count, us, done] = arguments;
+    import("/timeline.js").then(({ Timeline }) => {
+      const timeline = new Timeline(document.createElement("canvas"), { moved() {}, toggle() {} });
+      for (let at = 0; at < count; at++) {
+        const [grasp, health, began] = at % 2 ? ["Add", "degraded", at * us] : ["PoS", "", null];
+        timeline.follow([at * us, grasp, health, began === null ? "" : "Add", began], 0);
+      }
+      const [{ announced, health, segments }] = timeline.tracks;
+      done([announced.length, health.length, segments.length, (timeline.last - announced[0].from) / 1e6]);
+    });"""
+
+
+def test_the_past_that_a_page_keeps_is_bounded(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    *counts, seconds = browser.driver.execute_async_script(_KEPT, 60_000, 100_000)
+    assert counts == pytest.approx([12_000, 6_000, 6_000], abs=3)
+    assert seconds == pytest.approx(1200, abs=1)
+    # However often it changes.
+    *counts, seconds = browser.driver.execute_async_script(_KEPT, 60_000, 10_000)
+    assert counts == [20_000, 20_000, 20_000]
+    run.until(lambda: browser.text("grasp") == "Add")
+
+
 def recording(predictions: list[Any], others: list[Any], truth: list[Any]) -> dict[str, Any]:
     """Return what an overview says of two builds."""
     changes = [[(time_us, grasp, "", "", None) for time_us, grasp in some] for some in (predictions, others)]
@@ -241,12 +265,12 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             (1.5, "Add", "Truth: Add", "new: Add"),
             (2.1, "unknown", "Truth: Add", "✗ new: PoS"),
             (3.5, "Add", "Truth: no label", "new: Add"),
-            (6.0, "PoS", "✗ Truth: Add, predicted: PoS", "new: Add"),
+            (6.0, "PoS", "✗ Truth: Add, announced: PoS", "new: Add"),
             (8.15, "PoS", "Truth: no label", "new: Add"),
         ):
             browser.script("location.hash = `t=${arguments[0]}`", seconds)
             texts = (grasp, said, other)
-            browser.wait(lambda texts=texts: tuple(map(browser.text, ("grasp", "truth", "beside"))) == texts)
+            browser.wait(lambda texts=texts: tuple(map(browser.text, ("grasp", "truth", "other"))) == texts)
             wrong = said.startswith("✗")
             sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
             assert ("✗" in browser.script(sign)) == wrong

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.errors import BuildError
-from thenar.runtime.segmenting.decoder import _NEVER, _Paths
+from thenar.runtime.segmenting.decoder import _NEVER, Decoder
 from thenar.runtime.segmenting.model import LARGEST, SegmentModel, gain_of
 
 _USUAL = SegmentModel.usual(3, True, 100.0)
@@ -79,10 +79,10 @@ def test_whatever_the_decoder_compares_differs_by_no_more_than_is_proved(data: s
     model = SegmentModel(
         shift=0, gain=256, most=9, least=least, stay=(*held[0], 3), enter=held[1], leave=held[2], direct=held[3]
     )
-    paths, change = _Paths(model, 5), max(*held[1], *held[2], *held[3])
+    paths, change = Decoder(model, 5), max(*held[1], *held[2], *held[3])
     rows = data.draw(st.lists(st.lists(st.sampled_from([0, 9]), min_size=n_types + 1, max_size=n_types + 1)))
     for row in rows * 3:
-        paths.step(row)
+        paths._step(row)
         now = [best + total for best, total in zip(paths._best, paths._sums, strict=True)]
         left = [cost for cost in paths._costs[:2] if cost < _NEVER]
         assert max(*now, *left) + change - min(now) <= model.spread

@@ -105,7 +105,7 @@ def test_the_past_holds_changes_alone_and_marks_silence(
     server, glove = serve().server, glove_of(folder, "tcp://127.0.0.1:1")
     page = LivePage(server, glove, folder)
     grasp = replace(make_grasp(), grasp="hook", health="ok", state="none", segment_us=None)
-    seconds = (
+    seconds: tuple[tuple[float, dict[str, Any]], ...] = (
         (1.0, {}),
         (1.1, {"candidate": "pinch", "health": "changing"}),
         (1.2, {"state": "forming", "segment_us": 1_150_000, "segment_type": "hook"}),
@@ -114,7 +114,7 @@ def test_the_past_holds_changes_alone_and_marks_silence(
         (9.0, {}),
     )
     for time_s, changes in seconds:
-        moment = replace(grasp, time_us=round(1e6 * time_s), **changes)  # type: ignore[arg-type]
+        moment = replace(grasp, time_us=round(1e6 * time_s), **changes)
         page.show(Moment(moment, None, None, None))
     assert told_past(server) == {
         "topic": "past",

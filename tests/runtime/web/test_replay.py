@@ -141,6 +141,15 @@ def test_the_overview_comes_in_parts_that_join(replay: Callable[..., Replay], mo
     assert len(whole["truth"]) == 5
 
 
+def test_a_recording_of_too_many_changes_says_where_its_timeline_ends(
+    replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_MOST_CHANGES", 2)
+    overview = asked(replay(1, 2, 4, 8, 16, 32), "overview", 0, 0)
+    assert (len(overview["changes"][0]), len(overview["truth"])) == (2, 2)
+    assert overview["faults"] == ["the timeline ends at 2 changes of the prediction, or labels"]
+
+
 HUGE = 2**62
 
 
@@ -170,7 +179,8 @@ def test_what_is_no_span_is_refused_in_a_sentence(replay: Callable[..., Replay],
     for do in ("moments", "overview"):
         with pytest.raises(SettingError, match=f"for the {do} of a recording, a page must send . whole numbers"):
             shown.reply(do, numbers if do == "moments" or numbers != (0, 1) else (0, 1, 2))
-    for wrong in ("delete", "", None, 1, [], "x" * 10**6):
+    others: tuple[object, ...] = ("delete", "", None, 1, [], "x" * 10**6)
+    for wrong in others:
         with pytest.raises(SettingError, match="a page can ask for the overview or for moments") as refusal:
             shown.reply(wrong, (0, 1, 1))
         assert len(str(refusal.value)) < 120
