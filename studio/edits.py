@@ -16,7 +16,7 @@ from thenar.runtime.files import sync_folder
 
 
 def load_edits(path: Path) -> tuple[list[Edit], str]:
-    """Return what `read_edits` does, and no edits if there is no file."""
+    """Return the edits of `read_edits`; none if there is no file."""
     return read_edits(path) if path.exists() else ([], "")
 
 

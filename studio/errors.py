@@ -23,7 +23,7 @@ from .edits import change, last_action, load_edits, undo
 from .quick import QuickAccuracy, strongest
 from .studio import Asked, Handler, Report, Studio
 
-# A page shows so many trials at a time.
+# The most trials that a page is sent at a time.
 _MOST_SHOWN = 48
 
 
@@ -88,7 +88,7 @@ class BuildReading:
         return strongest(more[:, places[0]] - more[:, places[1]])
 
     def _sums(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return what each sensor adds to each type (d, K) on average of these rows."""
+        """Return how much each sensor adds to each type (d, K) on average of these rows."""
         tables, manifest = self._build.tables, self._build.manifest
         sums = np.zeros((len(self._quick.names), tables.n_classes))
         switches, joints = [one.source for one in manifest.switches], [joint.name for joint in manifest.joints]
@@ -122,7 +122,7 @@ class ErrorsPage:
         self._tell_edits()
 
     def _errors(self, asked: Asked) -> bytes:
-        """Return what the sensors, or the build, make of every trial."""
+        """Return as which type the sensors, or the build, recognise every trial."""
         quick, sensors = self._choose.known, asked.sensors
         if asked.name == "build":
             sensors = self._reading.sensors
@@ -136,7 +136,7 @@ class ErrorsPage:
         return message("errors", about, sensors=sensors, asked=(asked.name, asked.sensors))
 
     def _trials(self, asked: Asked) -> bytes:
-        """Return what sensors showed in trials, and which decided where one was misread."""
+        """Return the values of sensors in trials, and which decided where one was misread."""
         quick, shown = self._choose.known, list[dict[str, object]]()
         typical = {kind: [*map(float, shares)] for kind, shares in zip(quick.grasps, quick.typical, strict=True)}
         for trial in asked.trials[:_MOST_SHOWN]:

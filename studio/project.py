@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from shlex import join, quote
@@ -142,7 +143,7 @@ class Project:
         """
         if len(paths) == 1 and not self.edits.exists():
             return "", quote(str(paths[0]))
-        # Beside the project, of which it would be one more set.
+        # Next to the project, of which it would be one more set.
         whole = str(self.folder.resolve().parent / f"{self.name}.grasps")
         edits = ["--edits", str(self.edits)] if self.edits.exists() else []
         return f"{join(['thenar', 'merge', *map(str, paths), *edits, '-o', whole])} && ", quote(whole)
@@ -193,19 +194,21 @@ class Project:
 
 
 def _fitting(sets: dict[str, GraspSet]) -> tuple[dict[str, GraspSet], list[str]]:
-    """Return the sets of which each fits those before it, and a sentence on each other."""
+    """Return the sets that fit those with the most frequent columns, and a sentence on each other."""
     try:
         merge(sets)
         return sets, []
     except RecordingError:
         fitting, misfits = dict[str, GraspSet](), list[str]()
-    for name, one in sets.items():
+    columns = {name: frozenset((*one.element_names, *one.joint_names)) for name, one in sets.items()}
+    counts = Counter(columns.values())
+    for name in sorted(sets, key=lambda name: -counts[columns[name]]):
         try:
-            merge({**fitting, name: one})
-            fitting[name] = one
+            merge({**fitting, name: sets[name]})
+            fitting[name] = sets[name]
         except RecordingError as reason:
             misfits.append(f"{name} is left aside: {reason}")
-    return fitting, misfits
+    return {name: one for name, one in sets.items() if name in fitting}, misfits
 
 
 def _id(name: str) -> str:

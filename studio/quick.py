@@ -139,7 +139,7 @@ class QuickAccuracy:
         return np.flatnonzero(self.trial == trial)
 
     def seen(self, trial: int) -> Floats:
-        """Return what each sensor (d,) showed in a trial on average, 0 to 1 of its range in the set.
+        """Return the value of each sensor (d,) in a trial on average, 0 to 1 of its range in the set.
 
         Raises EvaluationError if there is no such trial.
         """
@@ -187,7 +187,8 @@ class QuickAccuracy:
         return _Sums(test, means, inside.T @ inside / len(train), shares)
 
     def places(self, sensors: Sequence[int]) -> Floats:
-        """Return where each trial (T, 2) lies on the two axes on which these sensors show the types furthest apart.
+        """Return where each trial (T, 2), 0 to 1, lies on the two axes on which these sensors show the types furthest
+        apart.
 
         They are the first axes of a discriminant of all rows. Raises EvaluationError if there is no such sensor.
         """
@@ -205,7 +206,9 @@ class QuickAccuracy:
         counts = np.bincount(trial)
         for axis in range(along.shape[1]):
             places[:, axis] = np.bincount(trial, weights=along[:, axis]) / counts
-        return places.round(3)
+        places -= places.min(axis=0)
+        shares: Floats = (places / np.maximum(places.max(axis=0), 1e-9)).round(4)
+        return shares
 
     def _right(self, columns: list[int]) -> int:
         labels, step = self._samples.labels, -(-len(self._samples.labels) // _MOST_TRIED)

@@ -8,7 +8,7 @@ import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const percent = (share) => `${Math.round(100 * share)} %`;
-const STEP = 24; // so many trials are shown at a time
+const STEP = 24; // the number of trials that are shown at a time
 const SVG = "http://www.w3.org/2000/svg";
 
 let set = null; // the message on the set
@@ -26,7 +26,7 @@ const map = new TrialMap($("map"), {
 });
 
 const ask = openPage({
-  open: () => set && look(),
+  open: () => set && !set.why && look(),
   set: (message) => {
     if (set && set.numbering === message.numbering && set.why === message.why) return;
     // Where a trial was left out, the next one has its number.
@@ -37,7 +37,6 @@ const ask = openPage({
     say($("empty"), set.why);
     if (set.why) return;
     list($("unused"), set.unused);
-    styles = typeStyles(set.types);
     $("type").replaceChildren(...set.types.map((name) => new Option(name)));
     select([]);
     look();
@@ -93,7 +92,7 @@ function show(message) {
   for (const id of ["next", "previous", "all-errors"]) $(id).disabled = !errors.length;
   const trials = reply.types.map(() => []);
   reply.truth.forEach((truth, trial) => trials[truth].push(trial));
-  for (const name of reply.types) if (!styles.has(name)) styles = typeStyles([...set.types, ...reply.types]);
+  styles = typeStyles([...set.types, ...reply.types]);
   matrix(trials);
   const looks = reply.truth.map((truth, trial) => ({ colour: styles.get(type(truth)).colour ?? "#8a8a8a", wrong: misread(trial) }));
   const labels = trials.flatMap((those, kind) => (those.length ? [{ code: styles.get(type(kind)).code, trials: those }] : []));
@@ -162,7 +161,10 @@ function select(trials) {
   $("selected").hidden = !trials.length;
   $("trials").replaceChildren();
   mark();
+  watcher.disconnect();
   if (!trials.length) return;
+  const proposed = type(pairOf(trials)[1] ?? reply.truth[trials[0]]);
+  $("type").value = set.types.includes(proposed) ? proposed : set.types[0];
   askFor(0);
   // On a phone they are further down.
   $("selection").scrollIntoView({ block: "nearest" });
@@ -191,7 +193,6 @@ function mark() {
   say($("relabel"), `Relabel ${count}`);
   say($("drop"), `Leave out ${count}`);
   const pair = pairOf(selected);
-  if (pair.length === 2) $("type").value = type(pair[1]);
   $("more").hidden = pair.length !== 2;
   if (pair.length !== 2) return;
   const query = new URLSearchParams({ types: pair.map(type).join(","), repetitions: 5 });
@@ -199,10 +200,10 @@ function mark() {
   say($("more"), `Record five more of ${pair.map(type).join(" and ")}`);
 }
 
-/** Return the true and the recognised type that all these trials have. */
+/** Return the true and the recognised type, if all these trials have the same two. */
 function pairOf(trials) {
-  return [reply?.truth, reply?.read].map((kinds) => new Set(trials.map((trial) => kinds[trial])))
-    .reduce((pair, kinds) => (pair && kinds.size === 1 ? [...pair, ...[...kinds].filter((kind) => !pair.includes(kind))] : null), []) ?? [];
+  const pairs = new Set(trials.map((trial) => `${reply.truth[trial]} ${reply.read[trial]}`));
+  return pairs.size === 1 ? [...new Set([...pairs][0].split(" "))].map(Number) : [];
 }
 
 function showTrials({ trials, typical }) {
@@ -226,7 +227,7 @@ function card({ trial, shown, decisive }, typical) {
   verdict.append(tag(styles, truth), " recognised as ", tag(styles, read));
   const inputs = document.createElement("ul");
   list(inputs, decisive.map((sensor) => {
-    const usual = [truth, read].map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");
+    const usual = [truth, read].filter((name) => typical[name]).map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");
     return `${set.sensors[sensor].name} ${percent(shown[sensor])} (${usual})`;
   }));
   made.append(label, verdict, ...hand(shown, decisive, set.trials[trial]), ...(decisive.length ? ["Decided by", inputs] : []));
@@ -241,7 +242,9 @@ function hand(shown, decisive, words) {
   if (!switches.length && !joints.length) return [];
   svg.setAttribute("role", "img");
   svg.setAttribute("aria-label", `hand: ${words}`);
-  whenSeen(svg, () => {
+  // Drawn when it is nearly on the screen: before, it has no width, and thousands would take long.
+  watcher.observe(svg);
+  waiting.set(svg, () => {
     const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
     const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
     const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
@@ -256,21 +259,14 @@ function hand(shown, decisive, words) {
   return [svg];
 }
 
-const waiting = new Map();
+const waiting = new WeakMap();
 const watcher = new IntersectionObserver((entries) => {
   for (const { target, isIntersecting } of entries) {
     if (!isIntersecting) continue;
     watcher.unobserve(target);
     waiting.get(target)();
-    waiting.delete(target);
   }
 }, { rootMargin: "300px" });
-
-/** Draw when it is nearly on the screen: before, it has no width, and thousands would take long. */
-function whenSeen(element, draw) {
-  waiting.set(element, draw);
-  watcher.observe(element);
-}
 
 /* ---- What the page is asked for ---- */
 

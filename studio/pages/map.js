@@ -51,14 +51,9 @@ export class TrialMap {
     this.#canvas.classList.toggle("lasso", on);
   }
 
-  /** places: [x, y] of each trial; looks: { colour, wrong } of each; codes: of each type { code, trials } */
+  /** places: [x, y] of each trial, 0 to 1; looks: { colour, wrong } of each; codes: of each type { code, trials } */
   show(places, looks, codes) {
-    const scaled = [0, 1].map((axis) => {
-      const values = places.map((place) => place[axis]);
-      const [low, high] = values.reduce(([least, most], value) => [Math.min(least, value), Math.max(most, value)], [Infinity, -Infinity]);
-      return values.map((value) => (value - low) / (high - low || 1));
-    });
-    this.#trials = looks.map((look, trial) => ({ ...look, x: scaled[0][trial], y: 1 - scaled[1][trial] }));
+    this.#trials = looks.map((look, trial) => ({ ...look, x: places[trial][0], y: 1 - places[trial][1] }));
     this.#labels = codes.map(({ code, trials }) => {
       const mean = (axis) => trials.reduce((sum, trial) => sum + this.#trials[trial][axis], 0) / trials.length;
       return { code, x: mean("x"), y: mean("y") };

@@ -277,16 +277,16 @@ def test_sets_are_used_left_aside_and_said_not_to_fit(
     folder = tmp_path / "recorded"
     folder.mkdir()
     replace(people, subjects=np.char.add(people.subjects, "2")).save(folder / "more.grasps")
-    replace(people, joints=(), codes=np.zeros((72, 0), np.uint16)).save(folder / "other glove.grasps")
+    replace(people, joints=(), codes=np.zeros((72, 0), np.uint16)).save(folder / "another glove.grasps")
     (folder / "torn.grasps").write_bytes(b"THNR")
     opened = studio()
     browser.open(opened.server.url)
     counts(browser, 0)
-    assert browser.texts("#sets label") == ["more.grasps", "other glove.grasps", "set.grasps", "torn.grasps"]
+    assert browser.texts("#sets label") == ["another glove.grasps", "more.grasps", "set.grasps", "torn.grasps"]
     left = browser.texts("#unused li")
     assert len(left) == 2
     assert left[0].startswith("torn.grasps is left aside: ")
-    assert left[1].startswith("other glove.grasps is left aside: other glove.grasps lacks 2 joints")
+    assert left[1].startswith("another glove.grasps is left aside: another glove.grasps lacks 2 joints")
     browser.click("add")
     counts(browser, 1)
     command = browser.text("command")
@@ -294,12 +294,12 @@ def test_sets_are_used_left_aside_and_said_not_to_fit(
     sets = f"{folder}/more.grasps {folder}/set.grasps"
     assert command.startswith(f"thenar merge {sets} -o {merged} && thenar compile {merged} -o ")
     boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#sets input")
-    for name in (1, 0, 3):
+    for name in (0, 1, 3):
         boxes[name].send_keys(Keys.SPACE)
     browser.wait(lambda: not browser.texts("#unused li"))
     browser.wait(lambda: browser.text("command").startswith(f"thenar compile {folder}/set.grasps -o "))
     counts(browser, 1)
-    assert Project(folder, opened.project.hand()).state.aside == ("more.grasps", "other glove.grasps", "torn.grasps")
+    assert Project(folder, opened.project.hand()).state.aside == ("another glove.grasps", "more.grasps", "torn.grasps")
     assert browser.axe() == []
 
 

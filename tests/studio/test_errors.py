@@ -395,48 +395,46 @@ def test_what_a_page_may_not_ask_for_is_refused(studio: Start, tmp_path: Path, a
     assert not (tmp_path / "recorded" / "edits.jsonl").exists()
 
 
+def busy_ms(browser: Browser) -> float:
+    """Return the processor time of the page's main thread so far, which other programs do not change."""
+    metrics = browser.driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    return 1000 * next(float(metric["value"]) for metric in metrics if metric["name"] == "TaskDuration")
+
+
 @pytest.mark.slow
 def test_a_page_of_four_thousand_trials_scrolls(browser: Browser, studio: Start) -> None:
-    """From a choice to the screen it takes half a second, and no frame of a scroll through it 100 ms."""
+    """From a choice to the screen it takes less than half a second, and a frame of a scroll less than its 1 / 60 s."""
     random, n = np.random.default_rng(1), 4000
-    labels = np.arange(n) % 14
+    labels, types = np.arange(n) % 14, [f"type {number}" for number in range(14)]
     closed = (random.random((14, 40)) < 0.4)[labels] ^ (random.random((n, 40)) < 0.35)
-    many = grasp_set_of(
-        [f"type {number}" for number in range(14)], labels, switches=closed, subjects=np.repeat(["A", "B"], n // 2)
-    )
-    opened = studio(many)
+    opened = studio(grasp_set_of(types, labels, switches=closed, subjects=np.repeat(["A", "B"], n // 2)))
+    browser.driver.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
     browser.open(f"{opened.server.url}errors.html")
-    browser.wait(lambda: "4000 trials misread" in browser.text("about"))
-    took = browser.driver.execute_async_script(
-        """const done = arguments[0], about = document.getElementById("about"), of = document.getElementById("of");
-        let came = false;
-        const began = performance.now(), notice = new MutationObserver(() => (came = true));
-        notice.observe(about, {childList: true, characterData: true, subtree: true});
-        of.value = "all";
-        of.dispatchEvent(new Event("change"));
-        const painted = () => requestAnimationFrame(() => setTimeout(() => done(performance.now() - began)));
-        const look = () => (came ? painted() : setTimeout(look, 1));
-        look();"""
-    )
-    print("painted", took)
-    assert took <= 500
+    browser.wait(lambda: "of 4000 trials misread" in browser.text("about"))
+    began = busy_ms(browser)
+    use(browser, "all", "40 sensors")
+    frames_later(browser, 3, 0)
+    assert busy_ms(browser) - began < 500
     browser.click("all-errors")
     cards(browser, 24)
     for shown in (48, 72, 96):
         browser.driver.find_element(By.ID, "show-more").send_keys(Keys.ENTER)
         cards(browser, shown)
-    frames = browser.driver.execute_async_script(
-        """const done = arguments[0], frames = [], panel = document.getElementById("selection");
-        let last = performance.now();
-        const step = (now) => {
-            frames.push(now - last);
-            last = now;
-            scrollBy(0, 60);
-            panel.scrollBy(0, 60);
-            if (frames.length < 120) requestAnimationFrame(step);
-            else done(frames.slice(1));
+    began = busy_ms(browser)
+    frames_later(browser, 120, 60)
+    assert (busy_ms(browser) - began) / 120 < 1000 / 60
+
+
+def frames_later(browser: Browser, frames: int, pixels: int) -> None:
+    """Wait for frames, and scroll so far before each."""
+    script = """const [frames, pixels, done] = arguments, panel = document.getElementById("selection");
+        let count = 0;
+        const step = () => {
+            scrollBy(0, pixels);
+            panel.scrollBy(0, pixels);
+            count += 1;
+            if (count < frames) requestAnimationFrame(step);
+            else done();
         };
         requestAnimationFrame(step);"""
-    )
-    print("frames", sorted(frames)[-5:])
-    assert max(frames) <= 100
+    browser.driver.execute_async_script(script, frames, pixels)

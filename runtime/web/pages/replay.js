@@ -120,7 +120,7 @@ export class Replay {
     const label = spanAt(truth, at)?.name ?? null, [, other] = tracks;
     this.#view.take(frame);
     const bad = label !== null && differs(frame.grasp, label);
-    say($("truth"), label === null ? "Truth: no label" : bad ? `✗ Truth: ${label}, predicted: ${frame.grasp}` : `Truth: ${label}`);
+    say($("truth"), label === null ? "Truth: no label" : bad ? `✗ Truth: ${label}, announced: ${frame.grasp}` : `Truth: ${label}`);
     for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
     if (!other) return;
     const second = spanAt(other.announced, at)?.name ?? "nothing", wrong = label !== null && differs(second, label);

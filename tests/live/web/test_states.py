@@ -265,7 +265,7 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             (1.5, "Add", "Truth: Add", "new: Add"),
             (2.1, "unknown", "Truth: Add", "✗ new: PoS"),
             (3.5, "Add", "Truth: no label", "new: Add"),
-            (6.0, "PoS", "✗ Truth: Add, predicted: PoS", "new: Add"),
+            (6.0, "PoS", "✗ Truth: Add, announced: PoS", "new: Add"),
             (8.15, "PoS", "Truth: no label", "new: Add"),
         ):
             browser.script("location.hash = `t=${arguments[0]}`", seconds)
