@@ -1,4 +1,4 @@
-"""A short code and a colour for each grasp type, by which pages and pictures tell types apart."""
+"""A short code and a colour for each grasp type, by which pages and pictures distinguish types."""
 
 import re
 from collections.abc import Iterable, Iterator
