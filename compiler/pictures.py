@@ -37,7 +37,7 @@ _SIZE = re.compile(rb'(<svg [^>]*?)width="[^"]*" height="[^"]*" ')
 # Where a label is tried, relative to its place, and how far from it, in points.
 _SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 _STEPS, _NEAR = (3.0, 7.0, 14.0, 22.0, 32.0, 44.0, 58.0, 74.0), 7.0
-_WORTH = 15.0  # so many points farther away are as bad as a line that is crossed
+_WORTH = 15.0  # the distance in points that is as bad as a line that is crossed
 _MARKER = 5.0  # points from the middle of a marker to its edge
 _SHARES = tuple(np.linspace(0.3, 0.9, 7).tolist())
 
