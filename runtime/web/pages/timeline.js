@@ -106,6 +106,7 @@ export class Timeline {
   #stale = true; // the lanes, and not just the cursor
   #drawn = 0;
   #saying = null;
+  #said = 0;
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
   constructor(canvas, on) {
@@ -234,7 +235,7 @@ export class Timeline {
     this.#stale = false;
     cursor.hidden = share < 0 || share > 1;
     cursor.style.transform = `translateX(${(share * this.#wide).toFixed(1)}px)`;
-    this.#saying ??= setTimeout(() => this.#say(), FOLLOW_MS);
+    this.#saying ??= setTimeout(() => this.#say(), Math.max(FOLLOW_MS - (performance.now() - this.#said), 0));
   }
 
   #draw() {
@@ -299,7 +300,7 @@ export class Timeline {
   }
 
   #say() {
-    this.#saying = null;
+    [this.#saying, this.#said] = [null, performance.now()];
     const { canvas, reading, last, first } = this, moved = this.at !== null || !this.live;
     say($("place"), reading);
     $("now").hidden = !this.live || this.at === null;
