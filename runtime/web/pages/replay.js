@@ -4,6 +4,7 @@ import { say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const ASK_MS = 80, LATER_MS = 500; // the server takes 20 requests a second
+const FRAME_MS = 40; // while it plays
 const AHEAD_US = 1_000_000, STEP_US = 33_000; // of moments asked for at once, at normal speed
 
 export class Replay {
@@ -83,7 +84,7 @@ export class Replay {
     }
     if (at >= last) this.#timeline.seek(first);
     this.#before = performance.now();
-    requestAnimationFrame((now) => this.#play(now));
+    this.#play();
   }
 
   /** The cursor was moved. */
@@ -94,10 +95,10 @@ export class Replay {
     if (!this.#playing) this.settled = setTimeout(() => this.#address(), LATER_MS);
   }
 
-  #play(now) {
+  #play() {
     if (!this.#playing) return;
-    requestAnimationFrame((next) => this.#play(next));
-    const { at, last } = this.#timeline, us = Math.min(at + (now - this.#before) * 1000 * this.#speed, last);
+    setTimeout(() => this.#play(), FRAME_MS);
+    const { at, last } = this.#timeline, now = performance.now(), us = Math.min(at + (now - this.#before) * 1000 * this.#speed, last);
     this.#before = now;
     // It waits for moments that have not come yet.
     if (this.#covers(us)) this.#timeline.seek(us);

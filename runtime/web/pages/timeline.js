@@ -7,7 +7,7 @@ const $ = (id) => document.getElementById(id);
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
-const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second
+const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second, and words change so often
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 let style = null; // the colours of the page, until its scheme changes
@@ -97,12 +97,16 @@ export class Timeline {
   #errors = []; // by track
   #from = 0;
   #span = USUAL_US;
+  #wide = 0;
   #whole = false; // while a recording is read, the window has all of it, until somebody zooms
   #styles = typeStyles([]);
   #pointers = new Map();
   #moved = 0;
   #drawing = false;
+  #stale = true; // the lanes, and not just the cursor
   #drawn = 0;
+  #saying = null;
+  #said = 0;
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
   constructor(canvas, on) {
@@ -177,11 +181,12 @@ export class Timeline {
   /** Put the cursor at a moment; null, and what is later than now, follows now. */
   seek(us) {
     if (this.last === null) return;
+    const from = this.#from;
     this.at = us === null || (this.live && us >= this.last) ? null : Math.round(Math.min(Math.max(us, this.first), this.last));
     if (this.at === null) this.#from = this.last - this.#span;
     else if (this.at < this.#from || this.at > this.#from + this.#span) this.#show(this.at - this.#span / 4);
     this.on.moved();
-    this.draw();
+    this.draw(from !== this.#from);
   }
 
   /** The lanes at the cursor, in words. */
@@ -215,7 +220,8 @@ export class Timeline {
   }
 
   /** Draw soon; while it follows now, ten times a second. */
-  draw() {
+  draw(stale = true) {
+    this.#stale ||= stale;
     if (this.#drawing) return;
     this.#drawing = true;
     const wait = this.live && this.at === null ? FOLLOW_MS - (performance.now() - this.#drawn) : 0;
@@ -224,7 +230,17 @@ export class Timeline {
 
   #paint() {
     [this.#drawing, this.#drawn] = [false, performance.now()];
+    const cursor = $("cursor"), share = this.at === null ? -1 : (this.at - this.#from) / this.#span;
+    if (this.#stale) this.#draw();
+    this.#stale = false;
+    cursor.hidden = share < 0 || share > 1;
+    cursor.style.transform = `translateX(${(share * this.#wide).toFixed(1)}px)`;
+    this.#saying ??= setTimeout(() => this.#say(), Math.max(FOLLOW_MS - (performance.now() - this.#said), 0));
+  }
+
+  #draw() {
     const { canvas } = this, lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, wide = canvas.clientWidth;
+    this.#wide = wide;
     if (canvas.style.height !== `${high}px`) canvas.style.height = `${high}px`;
     if (!wide) return;
     const dense = devicePixelRatio || 1, [across, down] = [Math.round(wide * dense), Math.round(high * dense)];
@@ -237,11 +253,6 @@ export class Timeline {
     pen.textBaseline = "middle";
     lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));
     this.#axis(pen, x, wide, high);
-    if (this.at !== null) {
-      pen.fillStyle = style.text;
-      pen.fillRect(x(this.at) - 1, 0, 2, high - FOOT);
-    }
-    this.#say();
   }
 
   #lane(pen, x, wide, name, bars, top) {
@@ -289,6 +300,7 @@ export class Timeline {
   }
 
   #say() {
+    [this.#saying, this.#said] = [null, performance.now()];
     const { canvas, reading, last, first } = this, moved = this.at !== null || !this.live;
     say($("place"), reading);
     $("now").hidden = !this.live || this.at === null;

@@ -274,6 +274,8 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             wrong = said.startswith("✗")
             sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
             assert ("✗" in browser.script(sign)) == wrong
+            place = f"0:0{seconds:.2f} of 0:09.0 · "
+            browser.wait(lambda place=place: browser.text("place").startswith(place))
             assert ("✗ old announced" in browser.text("place")) == wrong
             assert browser.axe() == []
             if wrong:
