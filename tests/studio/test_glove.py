@@ -115,7 +115,7 @@ class Moving(BoardSender):
     def line(self, now_s: float) -> bytes:
         """Return the next row."""
         shut = int(2 * now_s) % 2
-        self.show(dict.fromkeys(SWITCHES, shut) | {"p1": 100 + 700 * shut})
+        self.show(dict.fromkeys(SWITCHES, float(shut)) | {"p1": 100.0 + 700 * shut})
         return super().line(now_s)
 
 
