@@ -31,7 +31,7 @@ from .sensors import GloveSensors
 from .studio import Asked, Handler, Studio, glove_message
 
 _SHOW_US = 100_000
-# So many trials of every type have an accuracy.
+# From this number of trials of every type on there is an accuracy.
 _LEAST = 2
 Frames = tuple[SwitchFrame | None, GloveFrame | None]
 
@@ -183,7 +183,7 @@ class Collector:
         self._keys.put(asked.name)
 
     def _recorded(self, asked: Asked) -> bytes:
-        """Return what was captured in a trial, as the hand shows it."""
+        """Return the captured frames of a trial, as the hand shows them."""
         if asked.trial not in self._captured:
             raise ThenarError(f"trial {asked.trial} was not recorded")
         sensors = GloveSensors(self._studio.project.wiring(), self._studio.project.hand())

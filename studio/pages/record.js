@@ -42,6 +42,7 @@ const ask = openPage({
     });
     $("recordings").replaceChildren(...items);
   },
+  closed: () => say($("standing"), "this page is not connected"),
   collecting: (state) => show(state),
   trials: (message) => showTrials(message),
   "glove-hand": (message) => {

@@ -85,7 +85,8 @@ def test_a_stuck_a_silent_and_a_lost_sensor_are_told_apart(
 ) -> None:
     harness_in(folder, line.port)
     board.show({"s2": 1})
-    open_glove(browser, studio(None))
+    opened = studio(None)
+    open_glove(browser, opened)
     browser.wait(lambda: [*states(browser).values()] == ["never seen"] * 5)
     assert browser.text("problem") == "s1 has not changed yet: press it, or bend the finger"
     assert browser.axe() == []
@@ -106,6 +107,11 @@ def test_a_stuck_a_silent_and_a_lost_sensor_are_told_apart(
     browser.wait(lambda: {*states(browser).values()} == {"lost"})
     browser.wait(lambda: "check its cable" in browser.text("problem"))
     assert browser.script("return document.getElementById('glove-state').dataset.is") == "bad"
+    assert browser.axe() == []
+    assert not browser.script("return document.documentElement.classList.contains('old')")
+    opened.station.stop()
+    browser.wait(lambda: browser.script("return document.documentElement.classList.contains('old')"))
+    assert browser.text("counted").startswith("not watched since ")
     assert browser.axe() == []
 
 
