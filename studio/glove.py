@@ -258,6 +258,8 @@ class GlovePage:
     def _on_step(self, asked: Asked) -> None:
         if asked.name not in _POSE_KEYS:
             raise SettingError(f"there is no key {shortened(repr(asked.name))}")
+        if self._studio.station.doing != "calibrating":
+            raise SettingError("nothing is calibrated now")
         self._keys.put(asked.name)
 
     def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> None:

@@ -245,6 +245,7 @@ def test_it_can_be_used_by_everybody(
         ({"do": "past", "trial": -1}, "numbered from 0"),
         ({"do": "calibrate", "name": "../joints"}, "can be calibrated"),
         ({"do": "step", "name": "explode"}, "there is no key"),
+        ({"do": "step", "name": "accept"}, "nothing is calibrated now"),
     ],
 )
 def test_what_no_page_sends_is_refused(studio: Start, folder: Path, asked: dict[str, object], why: str) -> None:

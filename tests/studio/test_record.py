@@ -235,6 +235,7 @@ def test_it_can_be_used_by_everybody(
         ({"do": "record", "name": "Anna", "id": "kamakura14"}, "whole number from 1"),
         ({"do": "continue", "id": "../glove.toml"}, "the project has no recording"),
         ({"do": "key", "name": "explode"}, "there is no key"),
+        ({"do": "key", "name": "accept"}, "nothing is recorded now"),
         ({"do": "recorded", "trial": 99}, "was not recorded"),
         ({"do": "relabel", "trial": 1, "name": "Tip"}, "nothing was recorded here yet"),
     ],
