@@ -1,5 +1,6 @@
 // The page Glove: a glove is connected, watched and calibrated.
 import { drawHand } from "./hand.js";
+import { showKeys } from "./keys.js";
 import { openPage } from "./shell.js";
 import { clock } from "./state.js";
 import { cell, list, say } from "./wire.js";
@@ -203,20 +204,7 @@ function showStep({ step, what, problems, faults, keys }) {
   say($("what"), what);
   list($("problems"), problems);
   list($("faults"), faults);
-  const words = Object.entries(keys);
-  if (words.map(String).join() === $("keys").dataset.keys) return;
-  $("keys").dataset.keys = words.map(String).join();
-  const made = words.map(([key, said]) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = key === words[0][0] ? "" : "plain";
-    button.dataset.key = key;
-    button.textContent = said;
-    button.addEventListener("click", () => ask("step", { name: key }));
-    return button;
-  });
-  $("keys").replaceChildren(...made);
-  made[0]?.focus();
+  showKeys($("keys"), keys, (key) => ask("step", { name: key }))?.focus();
 }
 
 $("form").addEventListener("submit", (event) => {
