@@ -201,7 +201,7 @@ class TypedLines(Closing):
 
     def ask(self, question: Sequence[str], replies: Container[str], drawn: Callable[[], Table]) -> str | None:
         """Return "" or one of the `replies`, None while nothing was typed. The lines of a question are printed once
-        until it is answered; meanwhile a terminal shows what is `drawn`. Raises click.Abort for a q.
+        until there is a reply; meanwhile a terminal shows what is `drawn`. Raises click.Abort for a q.
         """
         if self._live is None:
             for line in question[-1:] if self._refused else question:

@@ -121,7 +121,7 @@ def task(guide: CollectionGuide, taxonomy: Taxonomy) -> tuple[str, str]:
 
 
 def standing(guide: CollectionGuide) -> str:
-    """Return what the guide does or waits for now, as a sentence."""
+    """Return the state of the trial now, as a sentence: the time left, what is missing, or what was captured."""
     if guide.waits:
         return f"the countdown waits: {guide.lost}"
     if guide.stage == "paused":

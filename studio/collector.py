@@ -31,7 +31,7 @@ from .sensors import GloveSensors
 from .studio import Asked, Handler, Studio, glove_message
 
 _SHOW_US = 100_000
-# So many trials of every type have an accuracy.
+# From this number of trials of every type on there is an accuracy.
 _LEAST = 2
 Frames = tuple[SwitchFrame | None, GloveFrame | None]
 
@@ -52,7 +52,7 @@ class Collector:
 
     def __init__(self, studio: Studio) -> None:
         self._studio = studio
-        self._keys = SimpleQueue[Key]()
+        self._keys: SimpleQueue[Key] | None = None
         self._captured = dict[int, Frames]()
         self._shown = -1, 0
         self._accepted: Sequence[int] | None = None
@@ -86,11 +86,12 @@ class Collector:
         countdown_s: float,
         stop: Event,
     ) -> None:
-        self._keys, self._shown, self._accepted = SimpleQueue(), (-1, 0), None
+        self._keys = keys = SimpleQueue[Key]()
+        self._shown, self._accepted = (-1, 0), None
         self._captured = {} if journal is None else _captured(recording)
         self._by_number = {trial.number: trial for trial in planned(collection)}
         self._studio.publish("collecting", message("collecting", stage="waiting", doing=doing))
-        view = partial(self._view, doing, Taxonomy(collection.taxonomy, collection.types))
+        view = partial(self._view, doing, keys, Taxonomy(collection.taxonomy, collection.types))
         try:
             done = collect(self._studio.project.harness, collection, recording, journal, view, stop, countdown_s)
         finally:
@@ -98,10 +99,16 @@ class Collector:
         write(done)
 
     def _ended(self) -> None:
+        self._keys = None
         self._studio.publish("collecting", message("collecting", stage="over"))
 
     def _view(
-        self, doing: str, taxonomy: Taxonomy, guide: CollectionGuide, devices: Sequence[DeviceHealth]
+        self,
+        doing: str,
+        keys: SimpleQueue[Key],
+        taxonomy: Taxonomy,
+        guide: CollectionGuide,
+        devices: Sequence[DeviceHealth],
     ) -> list[Key]:
         """Show the guide's state ten times a second and at every change; return the keys pressed."""
         now, (step, shown_us) = now_us(), self._shown
@@ -130,7 +137,7 @@ class Collector:
             }
             self._studio.publish("collecting", message("collecting", content))
             self._studio.publish("glove", glove_message(devices))
-        return [self._keys.get() for _ in range(self._keys.qsize())]
+        return [keys.get() for _ in range(keys.qsize())]
 
     def _trials(self, guide: CollectionGuide) -> bytes:
         """Return the message on the accepted trials, with the accuracy of all sensors if there are enough."""
@@ -180,10 +187,12 @@ class Collector:
     def _press(self, asked: Asked) -> None:
         if asked.name not in KEYS:
             raise ThenarError(f"there is no key {shortened(repr(asked.name))}")
+        if self._keys is None:
+            raise ThenarError("nothing is recorded now")
         self._keys.put(asked.name)
 
     def _recorded(self, asked: Asked) -> bytes:
-        """Return what was captured in a trial, as the hand shows it."""
+        """Return the captured frames of a trial, as the hand shows them."""
         if asked.trial not in self._captured:
             raise ThenarError(f"trial {asked.trial} was not recorded")
         sensors = GloveSensors(self._studio.project.wiring(), self._studio.project.hand())

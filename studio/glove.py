@@ -128,7 +128,14 @@ class GlovePage:
         self._start("watching", self._watch)
 
     def _watch(self, stop: Event) -> None:
-        """Show what every sensor does, until `stop` is set."""
+        try:
+            self._show(stop)
+        finally:
+            # A page that is opened later shows nothing old.
+            self._studio.publish("glove-state", message("glove-state", states=()))
+
+    def _show(self, stop: Event) -> None:
+        """Show the state of every sensor, until `stop` is set."""
         sensors = self._sensors()
         harness, kinds = self._project.wiring(), sensors.kinds
         past = self._past = [deque[tuple[float, int | None]](maxlen=_MOST_KEPT) for _ in kinds]
@@ -251,6 +258,8 @@ class GlovePage:
     def _on_step(self, asked: Asked) -> None:
         if asked.name not in _POSE_KEYS:
             raise SettingError(f"there is no key {shortened(repr(asked.name))}")
+        if self._studio.station.doing != "calibrating":
+            raise SettingError("nothing is calibrated now")
         self._keys.put(asked.name)
 
     def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> None:
@@ -272,7 +281,7 @@ def _nothing(_: str) -> int | None:
 
 
 def _state(value: int | None, kind: str, changes: int, others: int) -> str:
-    """Return the state of a sensor that shows `value`, after so many changes of its own, and of others since."""
+    """Return the state of a sensor that shows `value` after `changes`; `others` changed so often since its last one."""
     if value is None:
         return "lost"
     if others >= _CHANGES_OF_OTHERS[kind] and (value == 1 if kind == "switch" else changes):

@@ -1,11 +1,13 @@
 // The page Glove: a glove is connected, watched and calibrated.
 import { drawHand } from "./hand.js";
+import { showKeys } from "./keys.js";
 import { openPage } from "./shell.js";
+import { clock } from "./state.js";
 import { cell, list, say } from "./wire.js";
 
 const $ = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
-const PAST_S = 30, ASK_MS = 500;
+const PAST_S = 30, ASK_MS = 500, OLD_MS = 1000;
 const KINDS = { joint: "joints", pad: "pads" };
 
 let about = null; // the message on the glove
@@ -16,9 +18,11 @@ let states = [];
 let chosen = null; // the number of the sensor whose past is shown
 let problem = null;
 let begun = false; // whether this page began to watch
+let old = 0; // the timer after which the states are old
 
 const ask = openPage({
   open: () => (begun = false),
+  closed: () => stale(),
   "glove-hand": (message) => showGlove(message),
   station: ({ doing, why }) => {
     say($("watch"), doing === "watching" ? "Watch anew" : "Watch");
@@ -104,7 +108,11 @@ function showFound({ port, busy, columns, rows, remarks, text, wrong }) {
 }
 
 function showState(message) {
+  clearTimeout(old);
+  if (!message.states.length) stale();
   if (!about?.hand || message.states.length !== about.names.length) return;
+  old = setTimeout(stale, OLD_MS);
+  document.documentElement.classList.remove("old");
   hand.setClosed(message.closed, message.lost);
   hand.setTaxels(message.pressed);
   hand.setPose(message.values);
@@ -136,6 +144,14 @@ function showState(message) {
       return row;
     }),
   );
+}
+
+/** Grey what was seen before: nothing watches now. */
+function stale() {
+  document.documentElement.classList.add("old");
+  $("problem").disabled = true;
+  say($("problem"), "Watch to look for problems");
+  say($("counted"), states.length ? `not watched since ${clock(performance.now())}` : "not watched");
 }
 
 function choose(sensor) {
@@ -188,20 +204,7 @@ function showStep({ step, what, problems, faults, keys }) {
   say($("what"), what);
   list($("problems"), problems);
   list($("faults"), faults);
-  const words = Object.entries(keys);
-  if (words.map(String).join() === $("keys").dataset.keys) return;
-  $("keys").dataset.keys = words.map(String).join();
-  const made = words.map(([key, said]) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = key === words[0][0] ? "" : "plain";
-    button.dataset.key = key;
-    button.textContent = said;
-    button.addEventListener("click", () => ask("step", { name: key }));
-    return button;
-  });
-  $("keys").replaceChildren(...made);
-  made[0]?.focus();
+  showKeys($("keys"), keys, (key) => ask("step", { name: key }))?.focus();
 }
 
 $("form").addEventListener("submit", (event) => {

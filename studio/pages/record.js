@@ -1,6 +1,7 @@
 // The page Record: a collection is begun, led key by key, and ends with a set.
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
+import { showKeys } from "./keys.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
 import { list, say } from "./wire.js";
@@ -45,6 +46,7 @@ const ask = openPage({
     });
     $("recordings").replaceChildren(...items);
   },
+  closed: () => say($("standing"), "this page is not connected"),
   collecting: (state) => show(state),
   trials: (message) => showTrials(message),
   "glove-hand": (message) => {
@@ -113,7 +115,7 @@ function show(state) {
   if (stage === "waiting") {
     say($("prompt"), "Waiting for the glove …");
     for (const id of ["thing", "standing", "place"]) say($(id), "");
-    $("keys").replaceChildren();
+    showKeys($("keys"), {});
     return;
   }
   say($("place"), `${Math.min(number, total)} of ${total}; ${done} done${skipped ? `, ${skipped} skipped` : ""}`);
@@ -130,29 +132,12 @@ function show(state) {
     $("drawing").hidden = !known;
     say($("drawing-says"), known ? "" : `No picture of ${grasp}: hold the ${thing.replace(/^object /, "")} as you agreed.`);
   }
-  showKeys(keys);
+  const focused = document.activeElement === document.body || $("leading").contains(document.activeElement);
+  const first = showKeys($("keys"), keys, (key) => ask("key", { name: key }), LETTERS);
+  // During a countdown Enter is not expected: no button has the focus, which it would press by accident.
+  if (focused && "accept" in keys) first?.focus();
 }
 
-/** Show the keys that count now as buttons; the first is the one that Enter presses, and has the focus. */
-function showKeys(keys) {
-  const words = Object.entries(keys);
-  if (words.map(String).join() === $("keys").dataset.keys) return;
-  $("keys").dataset.keys = words.map(String).join();
-  const focused = !document.activeElement || document.activeElement === document.body || $("leading").contains(document.activeElement);
-  const buttons = words.map(([key, what]) => {
-    const button = document.createElement("button"), letter = document.createElement("kbd");
-    button.type = "button";
-    button.className = key === words[0][0] ? "" : "plain";
-    button.dataset.key = key;
-    letter.textContent = LETTERS[key];
-    button.append(what, letter);
-    button.addEventListener("click", () => ask("key", { name: key }));
-    return button;
-  });
-  $("keys").replaceChildren(...buttons);
-  // During the countdown Enter is expected next, not now: no button takes it by accident.
-  if (focused && "accept" in keys) buttons[0].focus();
-}
 
 document.addEventListener("keydown", (event) => {
   if (stage === "over" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;

@@ -85,7 +85,8 @@ def test_a_stuck_a_silent_and_a_lost_sensor_are_told_apart(
 ) -> None:
     harness_in(folder, line.port)
     board.show({"s2": 1})
-    open_glove(browser, studio(None))
+    opened = studio(None)
+    open_glove(browser, opened)
     browser.wait(lambda: [*states(browser).values()] == ["never seen"] * 5)
     assert browser.text("problem") == "s1 has not changed yet: press it, or bend the finger"
     assert browser.axe() == []
@@ -107,6 +108,11 @@ def test_a_stuck_a_silent_and_a_lost_sensor_are_told_apart(
     browser.wait(lambda: "check its cable" in browser.text("problem"))
     assert browser.script("return document.getElementById('glove-state').dataset.is") == "bad"
     assert browser.axe() == []
+    assert not browser.script("return document.documentElement.classList.contains('old')")
+    opened.station.stop()
+    browser.wait(lambda: browser.script("return document.documentElement.classList.contains('old')"))
+    assert browser.text("counted").startswith("not watched since ")
+    assert browser.axe() == []
 
 
 class Moving(BoardSender):
@@ -115,7 +121,7 @@ class Moving(BoardSender):
     def line(self, now_s: float) -> bytes:
         """Return the next row."""
         shut = int(2 * now_s) % 2
-        self.show(dict.fromkeys(SWITCHES, shut) | {"p1": 100 + 700 * shut})
+        self.show(dict.fromkeys(SWITCHES, float(shut)) | {"p1": 100.0 + 700 * shut})
         return super().line(now_s)
 
 
@@ -239,6 +245,7 @@ def test_it_can_be_used_by_everybody(
         ({"do": "past", "trial": -1}, "numbered from 0"),
         ({"do": "calibrate", "name": "../joints"}, "can be calibrated"),
         ({"do": "step", "name": "explode"}, "there is no key"),
+        ({"do": "step", "name": "accept"}, "nothing is calibrated now"),
     ],
 )
 def test_what_no_page_sends_is_refused(studio: Start, folder: Path, asked: dict[str, object], why: str) -> None:
