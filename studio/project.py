@@ -143,7 +143,7 @@ class Project:
         """
         if len(paths) == 1 and not self.edits.exists():
             return "", quote(str(paths[0]))
-        # Next to the project, of which it would be one more set.
+        # Next to the project: in it, it would be one more set.
         whole = str(self.folder.resolve().parent / f"{self.name}.grasps")
         edits = ["--edits", str(self.edits)] if self.edits.exists() else []
         return f"{join(['thenar', 'merge', *map(str, paths), *edits, '-o', whole])} && ", quote(whole)

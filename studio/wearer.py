@@ -157,7 +157,7 @@ class WearerPage:
         return whole, sorted({*whole.grasps.tolist()} - {*build.grasps, NONE})
 
     def _chosen(self, asked: Asked) -> bytes:
-        """Return what is in chosen sets, and the command that adapts to them."""
+        """Return the numbers of trials in chosen sets, by type, and the command that adapts to them."""
         paths, (base, build) = self._sets(asked), self._base()
         trials, added = self._trials(paths, build)
         counts = Counter(trials.grasps[np.unique(trials.trial_ids, return_index=True)[1]].tolist())
@@ -195,7 +195,7 @@ class WearerPage:
 
 
 def _result(made: AdaptedBuild) -> dict[str, object]:
-    """Return what an adapted build is worth on the wearer's trials, by type from the worst on."""
+    """Return how many of the trials are recognised before and after, by type from the worst on."""
     total = made.manifest.rates[0].total
     rates = [Rate.counted((right,), total, of="within subject") for right in (made.before, made.after)]
     types = zip(made.manifest.grasps, made.by_type, strict=True)

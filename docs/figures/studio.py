@@ -24,7 +24,8 @@ from selenium.webdriver.support.wait import WebDriverWait
 SCENE, GRASPS, PATIENCE_S = "quick", 20, 120
 # Segments are numbered from 1; "segment 21, held for 0.6 s".
 _READY = """const found = /segment (\\d+), held for ([\\d.]+)/.exec(document.getElementById('segment').textContent);
-    return found !== null && Number(found[1]) > arguments[0] && Number(found[2]) >= 0.5"""
+    const well = document.getElementById('health').textContent === 'ok';
+    return well && found !== null && Number(found[1]) > arguments[0] && Number(found[2]) >= 0.5"""
 
 
 @contextmanager
@@ -99,7 +100,7 @@ def main() -> None:
                 driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
                 wait.until(lambda _: driver.execute_script(_READY, GRASPS))
             with Image.open(BytesIO(driver.get_screenshot_as_png())) as taken:
-                taken.convert("RGB").quantize(48, dither=Image.Dither.NONE).save(options.picture, optimize=True)
+                taken.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(options.picture, optimize=True)
         finally:
             driver.quit()
 

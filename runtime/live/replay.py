@@ -103,7 +103,7 @@ class Stepper:
         if isinstance(entry, Session):
             self._begin(entry)
         elif isinstance(entry, SwitchFrame):
-            self.switches = entry if self._inputs is None else self._inputs.of(entry)
+            self.switches = self._matched(entry) if self._foreign else entry
         elif isinstance(entry, GloveFrame):
             self.glove = entry
         session = self.session
@@ -122,31 +122,23 @@ class Stepper:
         """Begin with a session, which has another clock: earlier entries are from another time."""
         self.session, self.switches, self.glove, self._now_us = session, None, None, 0
         if session.build == self._build.manifest.checksum:
-            self._inputs: _Inputs | None = None
+            self._foreign = False
             self._recognizer = _system(self._build, session, self._name, self._policy).recognizer()
         else:
-            self._inputs = _Inputs(self._build, session, self._name)
-            self._recognizer = self._inputs.recognizer(*self._periods)
+            self._foreign = True
+            self._match(session)
+            self._recognizer = LiveRecognizer(
+                self._build,
+                sensor_names=session.sensors,
+                calibration=session.calibration,
+                switch_period_us=self._periods[0],
+                glove_period_us=self._periods[1],
+            )
 
-
-def periods_us(entries: Iterable[Entry]) -> tuple[int | None, int | None]:
-    """Return the periods of switches and glove records among these entries; None if there were none."""
-    times: dict[type, list[int]] = {SwitchFrame: [], GloveFrame: []}
-    for entry in entries:
-        if isinstance(entry, SwitchFrame | GloveFrame):
-            times[type(entry)].append(entry.time_us)
-    steps = [sorted(b - a for a, b in pairwise(each) if b > a) or [0] * len(each[:1]) for each in times.values()]
-    switches, glove = (each[int(_USUALLY * (len(each) - 1))] if each else None for each in steps)
-    return switches, glove
-
-
-class _Inputs:
-    """The build's inputs in a recording of another build. Raises SettingError if the recording lacks one."""
-
-    def __init__(self, build: Build, session: Session, name: str) -> None:
-        self._build, self._session = build, session
-        harness = parse_harness(session.harness, name)
-        manifest, pins = build.manifest, set(harness.switches)
+    def _match(self, session: Session) -> None:
+        """Find the build's inputs in a session of another build. Raises SettingError if it lacks one."""
+        harness = parse_harness(session.harness, self._name)
+        manifest, pins = self._build.manifest, set(harness.switches)
         pairs, lacking = list[tuple[int, int]](), list[str]()
         levels: dict[str, list[tuple[int, int]]] = {name: [] for name in session.taxels}
         for number, switch in enumerate(manifest.switches):
@@ -160,28 +152,30 @@ class _Inputs:
         lacking += [joint.name for joint in manifest.joints if joint.name not in session.sensors]
         if lacking:
             raise SettingError(
-                f"{name} was recorded without {list_names(lacking)}, which the build reads: use a build "
+                f"{self._name} was recorded without {list_names(lacking)}, which the build reads: use a build "
                 "of the recorded inputs, or record all inputs of the build"
             )
         self._turn = BitRemap(pairs)
         self._taxels = Taxels(session.taxels, list(levels.values()), session.taxel_calibration)
         self._levels = 0, self._taxels.owned
 
-    def of(self, frame: SwitchFrame) -> SwitchFrame:
+    def _matched(self, frame: SwitchFrame) -> SwitchFrame:
         """Return a recorded frame with the bits of the build's switches; levels come from the newest counts."""
         if frame.taxels is not None:
             self._levels = self._taxels.read(frame.taxels)
         turn, (closed, lost) = self._turn, self._levels
         return replace(frame, closed=turn(frame.closed) | closed, lost=turn(frame.lost) | lost)
 
-    def recognizer(self, switch_period_us: int | None, glove_period_us: int | None) -> LiveRecognizer:
-        return LiveRecognizer(
-            self._build,
-            sensor_names=self._session.sensors,
-            calibration=self._session.calibration,
-            switch_period_us=switch_period_us,
-            glove_period_us=glove_period_us,
-        )
+
+def periods_us(entries: Iterable[Entry]) -> tuple[int | None, int | None]:
+    """Return the periods of switches and glove records among these entries; None if there were none."""
+    times: dict[type, list[int]] = {SwitchFrame: [], GloveFrame: []}
+    for entry in entries:
+        if isinstance(entry, SwitchFrame | GloveFrame):
+            times[type(entry)].append(entry.time_us)
+    steps = [sorted(b - a for a, b in pairwise(each) if b > a) or [0] * len(each[:1]) for each in times.values()]
+    switches, glove = (each[int(_USUALLY * (len(each) - 1))] if each else None for each in steps)
+    return switches, glove
 
 
 def _system(build: Build, session: Session, name: str, policy: Policy | None) -> LiveSystem:

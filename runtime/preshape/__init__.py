@@ -18,7 +18,7 @@ grasps = ["PoS", "CMF"]         # the grasp types, spelled as in the build; "non
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -30,7 +30,7 @@ from thenar.drivers.errors import SettingError
 
 from ..names import fault, nearest, shortened
 from ..published import NONE, UNKNOWN, LiveGrasp, Preshape
-from ..toml_source import Place, TomlText, read_source
+from ..toml_source import Place, read_source
 from ..toml_struct import check_finite, convert
 
 if TYPE_CHECKING:
@@ -136,6 +136,7 @@ SHIPPED = ("barrett_bh8", "parallel_gripper")
 _TO_SI = {"deg": math.pi / 180, "rad": 1.0, "mm": 0.001, "m": 1.0}
 
 _Name = Annotated[str, Meta(min_length=1)]
+Fault = tuple[Place, str]
 
 
 class _Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -166,8 +167,8 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
     tables = source.tables()
     check_finite(source, (), tables)
     content = convert(source, (), tables, _File)
-    _check_joints(source, content)
-    _check_preshapes(source, content)
+    for place, reason in _faults(content):
+        raise source.error(place, reason)
     names, factors = tuple(joint.name for joint in content.joints), [_TO_SI[joint.unit] for joint in content.joints]
     chosen = dict[str, Preshape]()
     for entry in content.preshapes:
@@ -206,49 +207,48 @@ def _find(name: str | os.PathLike[str]) -> "Traversable":
     return path
 
 
-def _check_name(source: TomlText, place: Place, name: str) -> None:
-    if reason := fault(name):
-        raise source.error(place, f"{shortened(repr(name))} {reason}")
-
-
-def _check_once(source: TomlText, place: Place, kind: str, name: str, seen: set[str]) -> None:
-    _check_name(source, place, name)
-    if name in seen:
-        raise source.error(place, f"{kind} {name!r} is named twice")
-    seen.add(name)
-
-
-def _check_joints(source: TomlText, content: _File) -> None:
+def _faults(content: _File) -> Iterator[Fault]:
+    """Yield the places and reasons of what is wrong beyond the types of fields; the first one counts."""
     if not content.joints:
-        raise source.error(("joints",), "must name at least one joint")
-    seen: set[str] = set()
+        yield ("joints",), "must name at least one joint"
+    yield from _of_names(content)
     for number, joint in enumerate(content.joints):
-        _check_once(source, ("joints", number, "name"), "joint", joint.name, seen)
         if joint.range[0] > joint.range[1]:
-            raise source.error(("joints", number, "range"), "must be the lowest and then the highest position")
-
-
-def _check_preshapes(source: TomlText, content: _File) -> None:
-    names: set[str] = set()
+            yield ("joints", number, "range"), "must be the lowest and then the highest position"
+    for number, entry in enumerate(content.preshapes):
+        yield from _of_positions(("preshapes", number, "positions"), entry, content.joints)
     grasps: dict[str, str] = {}
     for number, entry in enumerate(content.preshapes):
-        place: Place = ("preshapes", number)
-        _check_once(source, (*place, "name"), "preshape", entry.name, names)
-        _check_positions(source, (*place, "positions"), entry, content.joints)
         for index, grasp in enumerate(entry.grasps):
-            _check_name(source, (*place, "grasps", index), grasp)
+            place = ("preshapes", number, "grasps", index)
+            if reason := fault(grasp):
+                yield place, f"{shortened(repr(grasp))} {reason}"
             if grasp in grasps:
-                raise source.error((*place, "grasps", index), f"{grasp!r} already has preshape {grasps[grasp]!r}")
+                yield place, f"{grasp!r} already has preshape {grasps[grasp]!r}"
             grasps[grasp] = entry.name
     if not grasps:
-        raise source.error(("preshapes",), "must name at least one grasp type")
+        yield ("preshapes",), "must name at least one grasp type"
 
 
-def _check_positions(source: TomlText, place: Place, entry: _Entry, joints: tuple[_Joint, ...]) -> None:
+def _of_names(content: _File) -> Iterator[Fault]:
+    named: list[tuple[str, str, int, str]] = [
+        *(("joint", "joints", number, joint.name) for number, joint in enumerate(content.joints)),
+        *(("preshape", "preshapes", number, entry.name) for number, entry in enumerate(content.preshapes)),
+    ]
+    seen = set[tuple[str, str]]()
+    for kind, table, number, name in named:
+        if reason := fault(name):
+            yield (table, number, "name"), f"{shortened(repr(name))} {reason}"
+        if (kind, name) in seen:
+            yield (table, number, "name"), f"{kind} {name!r} is named twice"
+        seen.add((kind, name))
+
+
+def _of_positions(place: Place, entry: _Entry, joints: tuple[_Joint, ...]) -> Iterator[Fault]:
     if len(entry.positions) != len(joints):
-        raise source.error(place, f"must be {len(joints)} positions, one per joint, not {len(entry.positions)}")
+        yield place, f"must be {len(joints)} positions, one per joint, not {len(entry.positions)}"
     for number, (position, joint) in enumerate(zip(entry.positions, joints, strict=True)):
         low, high = joint.range
         if not low <= position <= high:
             reason = f"{position:g} {joint.unit} is outside {low:g} to {high:g}, the range of {joint.name}"
-            raise source.error((*place, number), reason)
+            yield (*place, number), reason

@@ -317,8 +317,7 @@ class Posed {
     this.forearm.setAttribute("d", line(pose.forearm, false));
     this.palm.setAttribute("d", line(pose.palm, true));
     for (const [digit, parts] of Object.entries(this.digits)) {
-      const bones = line(pose.chains[digit], false);
-      for (const part of parts) part.setAttribute("d", bones);
+      for (const part of parts) part.setAttribute("d", line(pose.chains[digit], false));
     }
     // A part of the hand is marked while one of its joints is lost.
     const lost = new Set(this.joints.filter((_, at) => this.values[at] === null).map(({ digit }) => digit));

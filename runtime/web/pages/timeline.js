@@ -10,8 +10,7 @@ const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
 const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
-let style = null;
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (style = null));
+let style = null; // the colours of the page, until its scheme changes
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
 export class Track {
@@ -114,6 +113,10 @@ export class Timeline {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
     new ResizeObserver(() => this.draw()).observe(canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      style = null;
+      this.draw();
+    });
     const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
     for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
     addEventListener("keydown", (event) => this.#key(event));
@@ -172,11 +175,11 @@ export class Timeline {
   }
 
   /** Put the cursor at a moment; null, and what is later than now, follows now. */
-  seek(us, show = true) {
+  seek(us) {
     if (this.last === null) return;
     this.at = us === null || (this.live && us >= this.last) ? null : Math.round(Math.min(Math.max(us, this.first), this.last));
     if (this.at === null) this.#from = this.last - this.#span;
-    else if (show && (this.at < this.#from || this.at > this.#from + this.#span)) this.#show(this.at - this.#span / 4);
+    else if (this.at < this.#from || this.at > this.#from + this.#span) this.#show(this.at - this.#span / 4);
     this.on.moved();
     this.draw();
   }

@@ -276,17 +276,23 @@ def test_a_server_that_comes_back_finds_the_page_where_it_was(
     with served(path, stage.builds["both"]) as server:
         address = server.url.removeprefix("http://").strip("/")
         browser.open(server.url + "#t=0.75")
-        browser.wait(lambda: place(browser) == 0.75)
-        press(browser, "+", "+")
+        browser.wait(lambda: browser.text("scanned") == "" and place(browser) == 0.75)
         browser.wait(lambda: browser.text("grasp") != "no frame yet")
-        zoomed, shown = ticks(browser), browser.text("grasp")
+        before = ticks(browser)
+        press(browser, "+")
+        browser.wait(lambda: ticks(browser) != before)
+        zoomed, shown, whole = ticks(browser), browser.text("grasp"), length(browser)
     browser.wait(lambda: browser.text("link").startswith("page: not connected"))
     with served(path, stage.builds["both"], address=address):
         browser.wait(lambda: browser.text("link").startswith("page: connected"))
         browser.wait(lambda: browser.text("scanned") == "" and browser.text("rates"))
         assert (place(browser), ticks(browser), browser.text("grasp")) == (0.75, zoomed, shown)
-        press(browser, Keys.END)
-        browser.wait(lambda: place(browser) == length(browser))
+
+        def at_the_end() -> bool:
+            press(browser, Keys.END)
+            return place(browser) == length(browser) == whole
+
+        browser.wait(at_the_end)  # it is read again
         browser.driver.get("about:blank")
     browser.log()  # of the server that was gone
 
