@@ -54,6 +54,10 @@ const ask = openPage({
     $("undo").disabled = !words;
     say($("edited"), words && `Last edit: ${words}.`);
   },
+  work: ({ done, total, what }) => {
+    const busy = done < total && what !== "reading";
+    say($("busy"), busy ? "Edits are shown here when the work that goes on is finished." : "");
+  },
   errors: (message) => {
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
   },

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from thenar.studio.errors import BuildReading
 from thenar.studio.project import Project
 from thenar.studio.quick import QuickAccuracy
 
-from ..browser import Browser
+from ..browser import PATIENCE_S, Browser
 from ..sets import grasp_set_of, single_settings
 from .test_choose import answers
 
@@ -258,6 +259,21 @@ def test_trials_are_relabelled_left_out_and_taken_back(browser: Browser, studio:
     browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
     browser.wait(lambda: browser.text("selection-heading") == heading)
     assert (folder / "set.grasps").read_bytes() == recording
+
+
+def test_an_edit_waits_for_work_that_goes_on(browser: Browser, studio: Start) -> None:
+    opened, ended = studio(), Event()
+    open_errors(browser, opened)
+    opened.queue("train", lambda _: [ended.wait(PATIENCE_S)].clear())
+    browser.wait(lambda: browser.text("busy").startswith("Edits are shown here when"))
+    browser.click("all-errors")
+    browser.wait(lambda: browser.texts("#trials article"))
+    browser.click("drop")
+    browser.wait(lambda: "left out." in browser.text("edited"))
+    assert "of 72 trials misread" in browser.text("about")
+    ended.set()
+    browser.wait(lambda: "of 72 trials misread" not in browser.text("about"))
+    browser.wait(lambda: not browser.text("busy"))
 
 
 def test_the_next_error_follows_the_one_that_was_left_out(browser: Browser, studio: Start) -> None:
