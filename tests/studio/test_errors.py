@@ -25,6 +25,7 @@ from thenar.studio.edits import change
 from thenar.studio.errors import BuildReading
 from thenar.studio.project import Project
 from thenar.studio.quick import QuickAccuracy
+from thenar.studio.studio import Report
 
 from ..browser import PATIENCE_S, Browser
 from ..sets import grasp_set_of, single_settings
@@ -264,7 +265,11 @@ def test_trials_are_relabelled_left_out_and_taken_back(browser: Browser, studio:
 def test_an_edit_waits_for_work_that_goes_on(browser: Browser, studio: Start) -> None:
     opened, ended = studio(), Event()
     open_errors(browser, opened)
-    opened.queue("train", lambda _: [ended.wait(PATIENCE_S)].clear())
+
+    def work(_: Report) -> None:
+        assert ended.wait(PATIENCE_S)
+
+    opened.queue("train", work)
     browser.wait(lambda: browser.text("busy").startswith("Edits are shown here when"))
     browser.click("all-errors")
     browser.wait(lambda: browser.texts("#trials article"))
