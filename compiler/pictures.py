@@ -37,6 +37,7 @@ _SIZE = re.compile(rb'(<svg [^>]*?)width="[^"]*" height="[^"]*" ')
 # Where a label is tried, relative to its place, and how far from it, in points.
 _SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 _STEPS, _NEAR = (3.0, 7.0, 14.0, 22.0, 32.0, 44.0, 58.0, 74.0), 7.0
+_WORTH = 15.0  # so many points farther away are as bad as a line that is crossed
 _MARKER = 5.0  # points from the middle of a marker to its edge
 _SHARES = tuple(np.linspace(0.3, 0.9, 7).tolist())
 
@@ -117,15 +118,14 @@ def rendered(figure: "Figure", kind: str) -> bytes:
         raise PictureError(f"a picture ends in .png or .svg, not in .{kind}")
     file = io.BytesIO()
     figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
-    # Without a size of its own, a drawing fills the page or the window that shows it.
+    # A drawing without a size fills the page or the window that shows it.
     return _SIZE.sub(rb"\1", file.getvalue(), count=1) if kind == "svg" else file.getvalue()
 
 
 def write_beside(axes: "Axes", labels: Iterable[Label], taken: Iterable[Box], lines: Iterable[Box] = ()) -> None:
-    """Write the text of each label beside its place, where it covers nothing; the first labels have the first choice.
+    """Write the text of each label next to its place, where it covers nothing; the first labels have the first choice.
 
-    A text that is far from its place is joined to it by a line. One that finds no room within the axes may cross
-    `lines`, or is left out.
+    A text that is far from its place is joined to it by a line. One that finds no room within the axes is left out.
 
     Parameters
     ----------
@@ -148,8 +148,8 @@ def write_beside(axes: "Axes", labels: Iterable[Label], taken: Iterable[Box], li
         text = axes.text(0, 0, words)
         size = text.get_window_extent(renderer)
         text.remove()
-        place, half = axes.transData.transform((x, y)), (size.width / 2, size.height / 2)
-        found: list[tuple[int, int, list[Box], list[float], bool]] = []
+        place, half = axes.transData.transform((x, y)), (size.width / 2 + 2 * unit, size.height / 2)
+        found: list[tuple[float, int, list[Box], list[float], bool]] = []
         for far, side in product(_STEPS, _SIDES):
             ahead, joined = [one * (reach + far * unit) for one, reach in zip(side, half, strict=True)], far > _NEAR
             (left, bottom), (right, top) = place + ahead - half, place + ahead + half
@@ -158,8 +158,8 @@ def write_beside(axes: "Axes", labels: Iterable[Label], taken: Iterable[Box], li
             covered = [(left, bottom, right, top), *joint]
             inside = room[0] < left and room[1] < bottom and right < room[2] and top < room[3]
             if inside and not any(_meet(one, other) for one in covered for other in boxes):
-                crossed = sum(_meet(one, other) for one in covered for other in thin)
-                found.append((crossed, len(found), covered, ahead, joined))
+                crossed = sum(_meet(covered[0], other) for other in thin)
+                found.append((crossed + far / _WORTH, len(found), covered, ahead, joined))
         if found:
             _, _, covered, ahead, joined = min(found)
             boxes += covered
@@ -169,7 +169,7 @@ def write_beside(axes: "Axes", labels: Iterable[Label], taken: Iterable[Box], li
 
 
 def around(axes: "Axes", x: float, y: float) -> Box:
-    """Return what the marker at a place in data coordinates takes, in pixels of the figure."""
+    """Return the box of the marker at a place in data coordinates, in pixels of the figure."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     (right, up), reach = axes.transData.transform((x, y)).tolist(), _MARKER * figure.dpi / 72

@@ -41,8 +41,8 @@ def picture(frontier: Frontier, kind: Literal["svg", "png"]) -> bytes:
 def draw(frontier: Frontier) -> "Figure":
     """Return the picture; call it inside `painting`.
 
-    Of points and marks of nearly the same time, those on the right are moved a little, so that they can be told apart.
-    Points of the front have intervals; those of the others, and of marks, are in tables.
+    Of points and marks of nearly the same time, those on the right are moved a little, to keep them apart. The points
+    of the front have intervals; those of the others, and of marks, are in tables.
     """
     figure, axes = _sheet(frontier)
     spoken_of = featured(frontier)
@@ -181,7 +181,7 @@ def _draw_tried(axes: "Axes", tried: Sequence[tuple[float, Tried]]) -> None:
 
 def _draw_best(axes: "Axes", best: Iterable[tuple[float, float]]) -> list[Box]:
     """Draw the line of best points, (cost, rate) each: from each point on its rate is reached, until a better one.
-    Return what its level parts take, in pixels.
+    Return the boxes of its level parts, in pixels.
 
     A point that is only best among those of its decision may lie below it.
     """
@@ -198,7 +198,7 @@ def _draw_best(axes: "Axes", best: Iterable[tuple[float, float]]) -> list[Box]:
 
 
 def _draw_interval(axes: "Axes", x: float, rate: Rate, colour: str) -> Box:
-    """Draw an interval, and return what it takes, in pixels."""
+    """Draw an interval, and return its box, in pixels."""
     axes.vlines([x], [rate.low], [rate.high], color=colour, lw=1.4, alpha=0.8, zorder=3)
     (left, bottom), (right, top) = axes.transData.transform([(x, rate.low), (x, rate.high)]).tolist()
     return left - 1, bottom, right + 1, top

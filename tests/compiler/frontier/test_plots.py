@@ -7,6 +7,7 @@ from itertools import combinations, pairwise
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection
@@ -88,7 +89,9 @@ def test_the_key_has_at_most_five_entries_and_labels_cover_nothing(examples: Any
     markers = [
         axes.transData.transform(place)
         for drawn in axes.collections
-        for place in (drawn.get_offsets() if isinstance(drawn, PathCollection) and drawn.zorder >= 4 else ())
+        for place in (
+            np.asarray(drawn.get_offsets()) if isinstance(drawn, PathCollection) and drawn.zorder >= 4 else ()
+        )
     ]
     assert len(markers) >= len(frontier.points) + len(frontier.marks)
     for box in boxes:
