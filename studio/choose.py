@@ -81,6 +81,7 @@ class ChoosePage:
             "unused": unused,
             "grasps": quick.grasps,
             "types": self.types,
+            "taxonomy": self._set.taxonomy.name,
             "joints": _joints(quick.held),
             "trials": _names(ids),
             "numbering": self.numbered[1],

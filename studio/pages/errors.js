@@ -199,7 +199,7 @@ function mark() {
   const pair = pairOf(selected);
   $("more").hidden = pair.length !== 2;
   if (pair.length !== 2) return;
-  const query = new URLSearchParams({ types: pair.map(type).join(","), repetitions: 5 });
+  const query = new URLSearchParams([...pair.map((kind) => ["type", type(kind)]), ["repetitions", 5]]);
   $("more").href = `record.html?${query}`;
   say($("more"), `Record five more of ${pair.map(type).join(" and ")}`);
 }

@@ -127,7 +127,7 @@ def test_a_number_of_the_matrix_shows_its_trials_as_hands(browser: Browser, stud
         assert all(f" ({truth} " in one and f", {read} " in one for one in decided)
     browser.wait(lambda: len(browser.texts("#trials .skin")) >= 2)
     more = str(browser.driver.find_element(By.ID, "more").get_attribute("href"))
-    assert more.endswith(f"record.html?types={truth}%2C{read}&repetitions=5")
+    assert more.endswith(f"record.html?type={truth}&type={read}&repetitions=5")
 
 
 def test_the_name_of_a_row_selects_its_errors(browser: Browser, studio: Start) -> None:
