@@ -40,7 +40,7 @@ from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.trainers.base import Model
-from thenar.runtime.code_line import CodeLine, Point
+from thenar.runtime.code_line import CodeLine
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
@@ -236,7 +236,7 @@ def whole_pass(tables: IntegerTables, bits: NDArray[np.bool_], *, core: bool) ->
     if core:
         files["thenar_glove.c"] = files["thenar_glove.c"].replace("#ifdef __AVR__", "#if 0")
     readings = np.random.default_rng(1).integers(0, 1024, (len(bits), JOINTS))
-    lines = [CodeLine(*map(Point, sensor.readings or (), sensor.codes)) for sensor in every]
+    lines = [CodeLine(*zip(sensor.readings or (), sensor.codes, strict=True)) for sensor in every]
     codes = [[line.code(reading) for line, reading in zip(lines, row, strict=True)] for row in readings.tolist()]
     switches = layout.frame_bytes(bits, np.zeros((len(bits), 0), np.uint16))
     frames = np.hstack([readings.astype("<i2").view(np.uint8), switches])

@@ -96,7 +96,7 @@ class Joints:
     of a glove that is not plugged into its box holds no measurement.
     """
 
-    __slots__ = ("_coded", "_codes", "_grace_us", "_last", "_longest_us", "_wanted", "newest")
+    __slots__ = ("_codes", "_grace_us", "_longest_us", "_wanted", "newest")
 
     def __init__(
         self,
@@ -111,8 +111,6 @@ class Joints:
         Raises SettingError if the CyberGlove cannot serve the build.
         """
         self.newest = Newest[GloveFrame]()
-        self._coded: GloveFrame | None = None
-        self._last: list[int] | None = None
         self._wanted, self._longest_us, self._grace_us = bool(joints), PERIODS * (period_us or 0), grace_us
         self._codes = None if period_us is None else CodeTables(joints, sensor_names, calibration)
 
@@ -126,15 +124,14 @@ class Joints:
         if frame is not None and frame is not newest.frame:
             newest.take(frame, now_us, self._longest_us)
         found = newest.frame
-        if found is not self._coded and found is not None:
-            self._last = self._codes.codes(found.sensors) if found.plugged else None
-            self._coded = found
-        return self._last if now_us <= max(newest.expires_us, newest.time_us + self._grace_us) else None
+        if found is None or not found.plugged or now_us > max(newest.expires_us, newest.time_us + self._grace_us):
+            return None
+        return self._codes.codes(found.sensors)
 
     @property
     def lost(self) -> Mask:
-        """The joints that the newest record does not measure."""
-        return 0 if self._codes is None or not self._last else self._codes.lost
+        """The joints that the record of the last codes does not measure."""
+        return 0 if self._codes is None else self._codes.lost
 
     def late(self, now_us: int) -> bool:
         """Return whether the codes are from a late record."""

@@ -17,7 +17,7 @@ def write_atomically(path: "Path", data: bytes, mode: int = 0o666) -> None:
     """Write `data` to `path`: temporary file in the same folder, fsync, rename, fsync of the folder.
 
     A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there
-    (after a kill beside the temporary one). The file's mode is `mode` without the bits of the umask. Raises OSError as
+    (after a kill next to the temporary one). The file's mode is `mode` without the bits of the umask. Raises OSError as
     the operating system gives it, with `path` as its file; also if `path` is a device or a pipe, which a rename would
     replace.
     """

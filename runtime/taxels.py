@@ -206,55 +206,42 @@ def _check_counts(coded: Calibration, others: bool) -> None:
     )
 
 
-class Taxels:
-    """The taxels of one device: converts its channels to levels of a build. For one thread.
+class LiveTaxel:
+    """A taxel of a device: converts its counts to levels of a build. For one thread.
 
-    names        of the taxels, channel by channel
-    levels       of each taxel: limits of its counts (see `count_limit`), with the numbers of the build's switches
-    calibration  rest and press of each taxel, in counts. Without it, no end of the converter is a fault, since the rest
-                 may be at either end
+    levels       limits of its counts (see `count_limit`), with the numbers of the build's switches
+    calibration  has its rest and press, in counts. Without it, no end of the converter is a fault, since the rest may
+                 be at either end
     highest      the converter's highest count; None: its ends are not checked
 
-    owned   the switches of all levels
-    faults  the fault of each taxel at its last reading. An end of the converter is a fault if neither the rest nor the
-            press of the calibration is near it: an open wire on the side of the rest, saturation on the side of the
-            press
+    owned  the switches of all levels
+    fault  of its last reading. An end of the converter is a fault if neither the rest nor the press of the calibration
+           is near it: an open wire on the side of the rest, saturation on the side of the press
     """
 
     def __init__(
         self,
-        names: Sequence[str],
-        levels: Sequence[Sequence[Level]],
+        name: str,
+        levels: Sequence[Level],
         calibration: TaxelCalibration | None = None,
         highest: int | None = None,
     ) -> None:
-        self.names, self.highest = tuple(names), highest
-        self._levels = [[(limit, 1 << switch) for limit, switch in each] for each in levels]
-        self._masks = [sum(bit for _, bit in each) for each in self._levels]
-        self.owned: Mask = sum(self._masks)
-        lines = [None if calibration is None else calibration.line(name) for name in names]
-        self._ends = [_ends(line, highest) for line in lines]
-        self.faults: list[TaxelFault] = [""] * len(self.names)
+        self.name, self.highest = name, highest
+        self._levels = [(limit, 1 << switch) for limit, switch in levels]
+        self.owned: Mask = sum(bit for _, bit in self._levels)
+        self._ends = _ends(None if calibration is None else calibration.line(name), highest)
+        self.fault: TaxelFault = ""
 
-    def read(self, codes: Sequence[int | None]) -> tuple[Mask, Mask]:
-        """Take the counts of all channels (None: unreadable); return the closed levels and the lost ones."""
-        closed = lost = 0
-        for place, count in enumerate(codes):
-            low, high, at_low, at_high = self._ends[place]
-            if count is None:
-                found: TaxelFault = "silent"
-            elif low < count < high:
-                found = ""
-            else:
-                found = at_low if count <= low else at_high
-            self.faults[place] = found
-            if found or count is None:
-                lost |= self._masks[place]
-                continue
-            for limit, bit in self._levels[place]:
-                if (count if limit >= 0 else ~count) > limit:
-                    closed |= bit
-        return closed, lost
+    def read(self, count: int | None) -> tuple[Mask, Mask]:
+        """Take the count (None: unreadable); return the closed levels and the lost ones."""
+        low, high, at_low, at_high = self._ends
+        if count is None:
+            self.fault = "silent"
+            return 0, self.owned
+        self.fault = "" if low < count < high else at_low if count <= low else at_high
+        if self.fault:
+            return 0, self.owned
+        return sum(bit for limit, bit in self._levels if (count if limit >= 0 else ~count) > limit), 0
 
 
 def _ends(line: TaxelLine | None, highest: int | None) -> tuple[int, int, TaxelFault, TaxelFault]:

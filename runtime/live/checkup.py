@@ -15,7 +15,7 @@ from ..harness.wiring import FASTEST_HZ, Harness
 from ..names import list_names
 from ..scanning.scanmap import ScanMap
 from ..sources.base import SOURCES, Source
-from ..taxels import Taxels
+from ..taxels import LiveTaxel
 from .quarantine import Chattering, numbers
 
 # A device may be this many times as slow as its wire, and this much: computers have other things to do, too.
@@ -130,12 +130,12 @@ def _wrong(switches: Sequence[str], frames: Sequence[SwitchFrame]) -> Iterator[s
         yield f"faster than a hand: {list_names([switches[number] for number in numbers(shaking)])}; a loose contact?"
 
 
-def _taxel(device: str, taxel: Taxels, harness: Harness, frames: Sequence[SwitchFrame]) -> CheckResult:
+def _taxel(device: str, taxel: LiveTaxel, harness: Harness, frames: Sequence[SwitchFrame]) -> CheckResult:
     """Return the finding on a taxel: its counts, their noise, and its fault.
 
     Without a calibration, counts at the ends of the converter are remarked, but are not faults.
     """
-    (name,), (fault,) = taxel.names, taxel.faults
+    name, fault = taxel.name, taxel.fault
     place = harness.taxel_names.index(name)
     counts = [code for frame in frames if frame.taxels is not None and (code := frame.taxels[place]) is not None]
     remarks: list[str] = [fault] if fault else []

@@ -17,7 +17,7 @@ from ..published import LiveGrasp
 from ..recording.reader import Entry, Reader
 from ..recording.session import Session
 from ..scanning.plan import plan_scan
-from ..taxels import Taxels, count_limit
+from ..taxels import LiveTaxel, count_limit
 from .recogniser import LiveRecognizer, Moment
 from .system import LiveSystem
 
@@ -156,13 +156,14 @@ class Stepper:
                 "of the recorded inputs, or record all inputs of the build"
             )
         self._turn = BitRemap(pairs)
-        self._taxels = Taxels(session.taxels, list(levels.values()), session.taxel_calibration)
-        self._levels = 0, self._taxels.owned
+        self._taxels = [LiveTaxel(name, own, session.taxel_calibration) for name, own in levels.items()]
+        self._levels = 0, sum(taxel.owned for taxel in self._taxels)
 
     def _matched(self, frame: SwitchFrame) -> SwitchFrame:
         """Return a recorded frame with the bits of the build's switches; levels come from the newest counts."""
         if frame.taxels is not None:
-            self._levels = self._taxels.read(frame.taxels)
+            read = [taxel.read(code) for taxel, code in zip(self._taxels, frame.taxels, strict=True)]
+            self._levels = sum(closed for closed, _ in read), sum(lost for _, lost in read)
         turn, (closed, lost) = self._turn, self._levels
         return replace(frame, closed=turn(frame.closed) | closed, lost=turn(frame.lost) | lost)
 

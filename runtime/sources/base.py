@@ -15,7 +15,7 @@ from ..harness.wiring import Debounce, Harness
 from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import ScanMap
-from ..taxels import Taxels
+from ..taxels import LiveTaxel
 
 # A device is expected back at least this often, however fast it is: a shorter limit would mistake a busy computer, or
 # the 16 ms for which a USB serial adapter may buffer bytes, for a cut cable.
@@ -37,8 +37,8 @@ class Source(ABC):
         The expected time from frame to frame. It may change with `open`.
     longest_us : int
         How long a frame is current, from its reading time: usually two periods, PERIODS * period_us.
-    taxels : sequence of Taxels
-        The taxels that it reads, one in each.
+    taxels : sequence of LiveTaxel
+        The taxels that it reads.
     part : str
         What the device says it is, once it is open; "" if it says nothing.
     notes : sequence of str
@@ -49,7 +49,7 @@ class Source(ABC):
     period_us: int
     longest_us: int
     owned: Mask = 0
-    taxels: Sequence[Taxels] = ()
+    taxels: Sequence[LiveTaxel] = ()
     part: str = ""
     notes: Sequence[str] = ()
 
@@ -88,8 +88,7 @@ class Source(ABC):
 
     def taxel_faults(self) -> str:
         """Return a sentence on the taxels with faults, "" without any; silent ones are reported with their device."""
-        found = ((each.names[0], each.faults[0]) for each in self.taxels)
-        faulty = [f"{name}: {fault}" for name, fault in found if fault not in ("", "silent")]
+        faulty = [f"{taxel.name}: {taxel.fault}" for taxel in self.taxels if taxel.fault not in ("", "silent")]
         return f"taxels with faults: {list_names(faulty)}" if faulty else ""
 
     def read_only(self, sensors: Sequence[str]) -> None:  # noqa: B027

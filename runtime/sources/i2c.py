@@ -14,7 +14,7 @@ from ..harness.wiring import Harness
 from ..published import Count
 from ..scanning.scanmap import SCHEMA, Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
-from ..taxels import TaxelCalibration, Taxels, calibration_of
+from ..taxels import LiveTaxel, TaxelCalibration, calibration_of
 from .base import Source, SourceKind, debouncer_of, paced_us
 
 
@@ -22,26 +22,26 @@ class PortReader:
     """The switches `targets` of a port, debounced: bits of its replies, some of them inverted, or levels of the taxel
     that a conversion measures.
 
-    taxels, place  of a conversion: the comparison of its counts, and its taxel's place among the harness's
+    taxel, place  of a conversion: its taxel, and the place among the harness's
     """
 
     def __init__(self, port: Port, harness: Harness, calibration: TaxelCalibration | None) -> None:
         self._debouncer = debouncer_of(harness.debounce)
         self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
         self._switches = BitRemap(port.switches)
-        self.targets, self.taxels, self.place = self._switches.targets, None, -1
+        self.targets, self.taxel, self.place = self._switches.targets, None, -1
         wired = harness.chip_of(port.bus, port.chip)
         if isinstance(wired.chip, Converter | SpiChip):
             channel = [reading.name for reading in wired.chip.readings].index(port.reading)
             name = wired.numbered_pins[channel]
             self.place = harness.taxel_names.index(name)
-            self.taxels = Taxels([name], [port.levels], calibration, wired.chip.highest)
-            self.targets = self.taxels.owned
+            self.taxel = LiveTaxel(name, port.levels, calibration, wired.chip.highest)
+            self.targets = self.taxel.owned
 
     def states(self, reply: int | None) -> tuple[Mask, Mask]:
         """Return the closed and the lost switches from a reply that came now; None: none came."""
-        if self.taxels is not None:
-            closed, lost = self.taxels.read((reply,))
+        if self.taxel is not None:
+            closed, lost = self.taxel.read(reply)
         else:
             closed, lost = (0, self.targets) if reply is None else (self._switches(reply ^ self._inverted), 0)
         if self._debouncer is None or reply is None:
@@ -56,7 +56,7 @@ class PortScanner(Source):
         calibration, wiring = calibration_of(harness.taxel_settings), harness.line_of(bus)
         self._ports = [PortReader(port, harness, calibration) for port in ports]
         self.owned: Mask = sum(port.targets for port in self._ports)
-        self.taxels = tuple(port.taxels for port in self._ports if port.taxels is not None)
+        self.taxels = tuple(port.taxel for port in self._ports if port.taxel is not None)
         self._wire_us = scan_us(ScanMap(SCHEMA, tuple(ports)), harness).us
         self._everything = len(harness.taxel_names)
         self._every_s, self._due_s, self._held_up = 1.0 / wiring.rate_hz, 0.0, 0
@@ -85,7 +85,7 @@ class PortScanner(Source):
         for port, reply in zip(self._ports, self.replies(), strict=True):
             shut, silent = port.states(reply)
             closed, lost = closed | shut, lost | silent
-            if port.taxels is not None:
+            if port.taxel is not None:
                 codes[port.place] = reply
         time_us = now_us()
         if time_us - began_us > self.longest_us:

@@ -14,7 +14,7 @@ from ..harness.wiring import Harness, Range, StreamWiring
 from ..names import list_names, shortened
 from ..published import Count
 from ..scanning.scanmap import ScanMap
-from ..taxels import Level, Taxels, calibration_of
+from ..taxels import Level, LiveTaxel, calibration_of
 from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of
 
 # Codes of joints are bytes, as a CyberGlove's; 0 is a joint without a value. A taxel's whole numbers are its codes;
@@ -262,7 +262,7 @@ class RowSource(Source):
         self.watch.begin()
         self._debouncer = debouncer_of(self._debounce)
         self.taxels = [
-            Taxels([name], [levels], self._calibration, grid.last)
+            LiveTaxel(name, levels, self._calibration, grid.last)
             for name, levels, grid in zip(self._taxel_names, self._levels, self._grids, strict=True)
         ]
 
@@ -369,10 +369,10 @@ class RowSource(Source):
                 closed |= bit if (value > threshold) != low else 0
         row: list[int | None] = [None] * len(self._everything)
         measured = values[self._first_taxel : self._first_taxel + len(self._grids)]
-        for taxels, grid, place, value in zip(self.taxels, self._grids, self._places, measured, strict=True):
+        for taxel, grid, place, value in zip(self.taxels, self._grids, self._places, measured, strict=True):
             row[place] = code = self._code(grid, value)
-            pressed, lost = taxels.read((code,))
-            closed, known = closed | pressed, known | taxels.owned & ~lost
+            pressed, lost = taxel.read(code)
+            closed, known = closed | pressed, known | taxel.owned & ~lost
         if self._debouncer is not None:
             closed = self._debouncer.update(time_us, closed, known) & known
         return SwitchFrame(time_us, closed, self.owned & ~known, glove, tuple(row) if self._grids else None)

@@ -8,9 +8,9 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.manifest import Calibration, Switch, Threshold
 from thenar.runtime.scanning.scanmap import Port, ScanMap, StreamRead
 from thenar.runtime.taxels import (
+    LiveTaxel,
     TaxelCalibration,
     TaxelLine,
-    Taxels,
     count_limit,
     in_counts,
     learnt_lines,
@@ -31,14 +31,14 @@ def lines(name: str = "pad") -> st.SearchStrategy[TaxelLine]:
     )
 
 
-def taxels(line: TaxelLine | None, *limits: int) -> Taxels:
+def taxel(line: TaxelLine | None, *limits: int) -> LiveTaxel:
     calibration = None if line is None else TaxelCalibration(taxels=(line,))
     levels = [(limit, number) for number, limit in enumerate(limits)]
-    return Taxels(["pad"], [levels], calibration, highest=1023)
+    return LiveTaxel("pad", levels, calibration, highest=1023)
 
 
 def closes(limit: int, raw: int) -> bool:
-    return taxels(None, limit).read([raw])[0] == 1
+    return taxel(None, limit).read(raw)[0] == 1
 
 
 @given(
@@ -92,18 +92,18 @@ def test_codes_that_are_no_counts_need_a_calibration() -> None:
     ],
 )
 def test_ends_of_the_converter(rest: int, press: int, raw: int, found: str) -> None:
-    pad = taxels(TaxelLine("pad", rest, press), 500)
-    closed, lost = pad.read([raw])
-    assert (pad.faults, lost) == ([found], 1 if found else 0)
+    pad = taxel(TaxelLine("pad", rest, press), 500)
+    closed, lost = pad.read(raw)
+    assert (pad.fault, lost) == (found, 1 if found else 0)
     assert not closed & lost
 
 
 def test_what_could_not_be_read_is_lost_and_the_rest_is_not() -> None:
-    both = Taxels(["one", "two"], [[(10, 0), (20, 2)], [(10, 1)]])
-    assert both.owned == 0b111
-    assert both.read([None, 11]) == (0b010, 0b101)
-    assert both.faults == ["silent", ""]
-    assert both.read([15, None]) == (0b001, 0b010)
+    one, two = LiveTaxel("one", [(10, 0), (20, 2)]), LiveTaxel("two", [(10, 1)])
+    assert (one.owned, two.owned) == (0b101, 0b010)
+    assert (one.read(None), two.read(11)) == ((0, 0b101), (0b010, 0))
+    assert (one.fault, two.fault) == ("silent", "")
+    assert (one.read(15), two.read(None)) == ((0b001, 0), (0, 0b010))
 
 
 def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:

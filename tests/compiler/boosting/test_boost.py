@@ -170,7 +170,7 @@ def test_every_loss_is_the_loss_of_the_scores_after_that_round(weighted: bool) -
 @settings(max_examples=25, deadline=None)
 def test_sets_that_are_trained_together_learn_what_each_learns_alone(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    sets = [grasps(seed + number, bits=rng.integers(1, 7), joints=rng.integers(0, 3)) for number in range(4)]
+    sets = [grasps(seed + number, bits=int(rng.integers(1, 7)), joints=int(rng.integers(0, 3))) for number in range(4)]
     lacking = sets[1][0].astype(np.float64)
     lacking[rng.random(lacking.shape) < 0.2] = np.nan
     sets[1] = lacking, sets[1][1]

@@ -19,7 +19,7 @@ from thenar.runtime.manifest import Calibration, Threshold
 from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine, Taxels, count_limit
+from thenar.runtime.taxels import LiveTaxel, TaxelCalibration, TaxelLine, count_limit
 
 SENSORS = ("thumb_mpj", "index_mpj", "wrist_pitch", "wrist_yaw")
 CALIBRATION = GloveCalibration(
@@ -317,7 +317,7 @@ def test_codes_of_another_calibration_are_those_that_the_live_recogniser_gives_i
     first = PADS.taxels[0]
     coded = Calibration(0, "p", "N", first.rest, 0.0, first.press, first.value)
     limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", taxels=(own,)))
-    closed, _ = Taxels(["p"], [[(limit, 0)]]).read([raw])
+    closed, _ = LiveTaxel("p", [(limit, 0)]).read(raw)
     grasps = [
         (
             _Part("", replace(ANALOG, taxel_calibration=TaxelCalibration(unit="N", taxels=(line,))), COLLECTION, ()),
