@@ -407,6 +407,7 @@ def test_a_build_says_what_it_was_trained_on(
     cards(browser, len(misread(reply)))
     assert said(browser, "#trials article li")
     # A build that cannot read these recordings is not offered.
+    browser.driver.get("about:blank")
     opened.close()
     others = replace(people, switch_names=tuple(f"pad {number}" for number in range(8)))
     opened = studio(others)
