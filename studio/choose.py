@@ -81,6 +81,7 @@ class ChoosePage:
             "unused": unused,
             "grasps": quick.grasps,
             "types": self.types,
+            "taxonomy": self._set.taxonomy.name,
             "joints": _joints(quick.held),
             "trials": _names(ids),
             "numbering": self.numbered[1],
@@ -122,8 +123,7 @@ class ChoosePage:
     def _later(self, asked: Asked) -> None:
         if asked.do != "curve" and not asked.sensors:
             raise ThenarError("choose a sensor first: without any, nothing can be learnt")
-        self._names(asked.sensors)
-        self._studio.queue(asked.do, partial(self._measure, asked))
+        self._studio.queue(asked.do, partial(self._measure, asked, self._names(asked.sensors)))
 
     def _names(self, sensors: Sequence[int]) -> tuple[str, ...]:
         """Return the names of sensors, each once, in this order. Raises EvaluationError if there is no such number."""
@@ -168,9 +168,13 @@ class ChoosePage:
         every = self._set.element_names
         return {every[one.column]: name for one, name in zip(elements, names_of(held, elements), strict=True)}
 
-    def _measure(self, asked: Asked, report: Report) -> None:
-        """Measure the curve, or the accuracy of chosen sensors, or train a build of these; tell all pages."""
-        names = self._names(asked.sensors)
+    def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> None:
+        """Measure the curve, or the accuracy of chosen sensors, or train a build of these; tell all pages.
+
+        Raises ThenarError if their numbers mean other sensors by now.
+        """
+        if self._names(asked.sensors) != names:
+            raise ThenarError("the recordings have other sensors now: choose again")
         recipe = Recipe() if asked.do == "curve" else Recipe(sensors=len(names), have=names)
         many: dict[str, Any] = {"jobs": self._studio.jobs}
         if asked.do == "train":
@@ -183,7 +187,8 @@ class ChoosePage:
         else:
             limits = Limits.of(recipe, self._set, {}, prices=self._prices)
             content = self._content(study_sensors(self._set, recipe, limits=limits, report=report, **many))
-        self._studio.publish(asked.do, message(asked.do, sensors=asked.sensors, **content))
+        content |= {"sensors": asked.sensors, "numbering": self.numbered[1]}
+        self._studio.publish(asked.do, message(asked.do, content))
 
     def _content(self, study: SensorStudy) -> dict[str, object]:
         numbers = {name: number for number, name in enumerate(self.known.names)}

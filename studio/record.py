@@ -13,6 +13,7 @@ from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.compiler.recordings.taxonomy import ANY, collected
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.files import write_atomically
+from thenar.runtime.published import NONE
 from thenar.runtime.recording.guide import Journal, planned, read_journal
 from thenar.runtime.recording.session import Collection
 from thenar.runtime.web.server import message
@@ -79,7 +80,7 @@ class RecordPage:
 
     def _begin(self, asked: Asked) -> None:
         """Begin a collection: `name` is the subject, `id` the taxonomy, `value` the repetitions, `names`
-        own types that no objects.toml lists yet; trial: with none.
+        own types that no objects.toml lists yet; trial: with none; `ids`: types, if only those are recorded.
         """
         repetitions = asked.value or 0
         if not (1 <= repetitions <= _MOST_REPETITIONS and repetitions == int(repetitions)):
@@ -91,6 +92,9 @@ class RecordPage:
         if asked.id == "own" and self._objects is None:
             self._write_types(asked.names)
         types, tasks = collected(asked.id, self._objects, bool(asked.trial))
+        if unknown := [name for name in asked.ids if name not in types.types]:
+            raise SettingError(types.unknown(unknown[0]))
+        tasks = tuple(task for task in tasks if not asked.ids or task.grasp in (*asked.ids, NONE))
         collection = Collection(asked.name, types.name, types.types, tasks, int(repetitions), secrets.randbits(32))
         planned(collection)
         recording = self._project.new_path(asked.name, ".mcap", ".grasps")

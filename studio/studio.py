@@ -134,9 +134,15 @@ class Studio(Closing):
             self._queue.put(("reading", self._read))
 
     def _read(self, report: Report) -> None:
-        self._stale = False
+        self._stale, reasons = False, list[Exception]()
         for read in self._readers:
-            read(report)
+            # What one page cannot read, others may not need.
+            try:
+                read(report)
+            except (ThenarError, OSError) as reason:
+                reasons.append(reason)
+        if reasons:
+            raise reasons[0]
 
     def run(self, stop: Event) -> None:
         """Do what pages ask for, until `stop` is set."""

@@ -24,7 +24,11 @@ const ask = openPage({
     say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");
   },
   set: (message) => {
-    if (set && set.numbering !== message.numbering) measured.clear();
+    // What was measured of earlier recordings is not shown for these.
+    if (set?.numbering !== message.numbering) {
+      measured.clear();
+      $("curve-panel").hidden = true;
+    }
     set = message;
     $("empty").hidden = !set.why;
     say($("empty"), set.why);
@@ -48,11 +52,12 @@ const ask = openPage({
   drop: ({ sensor, sensors }) => {
     if (sensor !== null && isChosen(sensors)) choose(chosen.filter((one) => one !== sensor));
   },
-  measure: ({ sensors, points, of, recipe }) => {
+  measure: ({ sensors, points, of, recipe, numbering }) => {
+    if (numbering !== set.numbering) return;
     measured.set(key(sensors), { ...points[0], of, recipe });
     certify();
   },
-  curve: (curve) => drawCurve(curve),
+  curve: (curve) => curve.numbering === set.numbering && drawCurve(curve),
   train: ({ folder, facts }) => {
     $("build").hidden = false;
     say($("build-heading"), `Trained: ${folder}`);

@@ -54,6 +54,10 @@ const ask = openPage({
     $("undo").disabled = !words;
     say($("edited"), words && `Last edit: ${words}.`);
   },
+  work: ({ done, total, what }) => {
+    const busy = done < total && what !== "reading";
+    say($("busy"), busy ? "Edits are shown here when the work that goes on is finished." : "");
+  },
   errors: (message) => {
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
   },
@@ -195,7 +199,7 @@ function mark() {
   const pair = pairOf(selected);
   $("more").hidden = pair.length !== 2;
   if (pair.length !== 2) return;
-  const query = new URLSearchParams({ types: pair.map(type).join(","), repetitions: 5 });
+  const query = new URLSearchParams([...pair.map((kind) => ["type", type(kind)]), ["repetitions", 5]]);
   $("more").href = `record.html?${query}`;
   say($("more"), `Record five more of ${pair.map(type).join(" and ")}`);
 }

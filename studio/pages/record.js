@@ -10,6 +10,9 @@ const $ = (id) => document.getElementById(id);
 const percent = (share) => (100 * share).toFixed(1);
 const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
 
+const query = new URLSearchParams(location.search);
+const only = query.getAll("type"); // types of which the page Errors asks for more; none: all are recorded
+
 let stage = "over";
 let doing = ""; // what the collection is for
 let sensors = 0; // of the project's set, for Train
@@ -75,10 +78,15 @@ const ask = openPage({
     say($("size"), `${size}; ${done} of ${total} trials are done`);
     list($("warnings"), warnings.length ? warnings : ["The import has no warning."]);
   },
-  set: ({ why, sensors: all }) => {
+  set: ({ why, types, taxonomy, sensors: all }) => {
     sensors = all.length;
     $("train").disabled = Boolean(why);
     if (why) say($("work"), why);
+    if (why || !only.length) return;
+    // More of the same set.
+    $("taxonomy").value = [...$("taxonomy").options].some(({ value }) => value === taxonomy) ? taxonomy : "own";
+    $("types").value = types.join(", ");
+    askTypes();
   },
   work: ({ done, total, what, why }) => {
     const busy = { reading: "reading", train: "training" }[what] ?? what;
@@ -188,6 +196,10 @@ function accuracyWords(accuracy) {
   return `All sensors tell these trials apart in ${percent(mean)} % [${percent(low)}, ${percent(high)}], ${of}; quick: not nested`;
 }
 
+$("repetitions").value = query.get("repetitions") ?? $("repetitions").value;
+$("only").hidden = !only.length;
+say($("only"), `Only of ${only.join(" and ")}.`);
+if (only.length) $("none").checked = false;
 $("subject").addEventListener("input", () => (edited = true));
 $("taxonomy").addEventListener("change", askTypes);
 $("form").addEventListener("submit", (event) => {
@@ -198,6 +210,7 @@ $("form").addEventListener("submit", (event) => {
     names: $("own-types").hidden ? [] : $("types").value.split(",").map((name) => name.trim()),
     value: Number($("repetitions").value),
     trial: Number($("none").checked),
+    ids: only,
   });
 });
 $("relabel").addEventListener("submit", (event) => {

@@ -343,6 +343,32 @@ def test_a_point_of_the_front_says_what_it_is_and_is_chosen(browser: Browser, st
     assert {*browser.text("command").rpartition(" ")[2].split(",")} == {*names}
 
 
+def test_what_was_measured_is_not_shown_of_recordings_that_changed(
+    browser: Browser, studio: Start, people: GraspSet, tmp_path: Path
+) -> None:
+    opened = studio()
+    browser.open(opened.server.url)
+    counts(browser, 0)
+    browser.click("add")
+    counts(browser, 1)
+    browser.click("measure")
+    browser.wait(lambda: browser.text("measured"))
+    browser.click("curve")
+    browser.wait(lambda: browser.text("point-heading"))
+    browser.driver.refresh()
+    browser.wait(lambda: browser.text("measured"))
+    panel = browser.driver.find_element(By.ID, "curve-panel")
+    browser.wait(panel.is_displayed)
+    change(tmp_path / "recorded" / "edits.jsonl", trials_of("set.grasps", people)[:9], "")
+    opened.changed()
+    browser.wait(lambda: not panel.is_displayed())
+    browser.wait(lambda: not browser.text("measured"))
+    browser.driver.refresh()
+    counts(browser, 1)
+    assert not browser.driver.find_element(By.ID, "curve-panel").is_displayed()
+    assert not browser.text("measured")
+
+
 def test_work_says_how_long_it_takes_still_and_is_cancelled(browser: Browser, studio: Start, tmp_path: Path) -> None:
     """As long as the last time at first, which counts down, and then as its parts took so far."""
     opened = studio()

@@ -164,6 +164,22 @@ def test_a_line_that_a_kill_left_is_named_and_the_next_edit_replaces_it(tmp_path
     assert found == [(cup, "pen", 0), (rod, "", 0), (rod, "rod", 2)]
 
 
+@settings(max_examples=60)
+@given(cut=st.floats(0.0, 1.0))
+def test_a_log_that_is_cut_anywhere_has_the_edits_before(tmp_path_factory: pytest.TempPathFactory, cut: float) -> None:
+    log, trials = tmp_path_factory.mktemp("cut") / "edits.jsonl", trials_of("a.grasps", clashing())
+    for trial, new in zip(trials, ("pen", "rod", ""), strict=True):
+        change(log, [trial], new)
+    whole, edits = log.read_bytes(), read_edits(log)[0]
+    left = whole[: round(cut * len(whole))]
+    log.write_bytes(left)
+    *before, last = left.split(b"\n")
+    found, damaged = read_edits(log)
+    # A line without its break is whole, too.
+    assert found == edits[: len(before) + last.endswith(b"}")]
+    assert bool(damaged) == bool(last and not last.endswith(b"}"))
+
+
 def test_damage_elsewhere_is_an_error_with_its_line(tmp_path: Path) -> None:
     log, (cup, pen, _) = tmp_path / "edits.jsonl", trials_of("a.grasps", clashing())
     change(log, [cup], "pen")

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,19 @@ from selenium.webdriver.common.keys import Keys
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.hand import HandShape
-from thenar.compiler.recordings.edits import read_edits
+from thenar.compiler.recordings.edits import read_edits, trials_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import select_inputs
 from thenar.runtime import Build
 from thenar.runtime.recipe import Recipe
 from thenar.studio import Studio
+from thenar.studio.edits import change
 from thenar.studio.errors import BuildReading
 from thenar.studio.project import Project
 from thenar.studio.quick import QuickAccuracy
+from thenar.studio.studio import Report
 
-from ..browser import Browser
+from ..browser import PATIENCE_S, Browser
 from ..sets import grasp_set_of, single_settings
 from .test_choose import answers
 
@@ -124,7 +127,7 @@ def test_a_number_of_the_matrix_shows_its_trials_as_hands(browser: Browser, stud
         assert all(f" ({truth} " in one and f", {read} " in one for one in decided)
     browser.wait(lambda: len(browser.texts("#trials .skin")) >= 2)
     more = str(browser.driver.find_element(By.ID, "more").get_attribute("href"))
-    assert more.endswith(f"record.html?types={truth}%2C{read}&repetitions=5")
+    assert more.endswith(f"record.html?type={truth}&type={read}&repetitions=5")
 
 
 def test_the_name_of_a_row_selects_its_errors(browser: Browser, studio: Start) -> None:
@@ -259,6 +262,64 @@ def test_trials_are_relabelled_left_out_and_taken_back(browser: Browser, studio:
     assert (folder / "set.grasps").read_bytes() == recording
 
 
+def test_an_edit_waits_for_work_that_goes_on(browser: Browser, studio: Start) -> None:
+    opened, ended = studio(), Event()
+    open_errors(browser, opened)
+
+    def work(_: Report) -> None:
+        assert ended.wait(PATIENCE_S)
+
+    opened.queue("train", work)
+    browser.wait(lambda: browser.text("busy").startswith("Edits are shown here when"))
+    browser.click("all-errors")
+    browser.wait(lambda: browser.texts("#trials article"))
+    browser.click("drop")
+    browser.wait(lambda: "left out." in browser.text("edited"))
+    assert "of 72 trials misread" in browser.text("about")
+    ended.set()
+    browser.wait(lambda: "of 72 trials misread" not in browser.text("about"))
+    browser.wait(lambda: not browser.text("busy"))
+
+
+def test_the_next_error_follows_the_one_that_was_left_out(browser: Browser, studio: Start) -> None:
+    opened = studio()
+    choose_two(browser, opened)
+    browser.driver.get(f"{opened.server.url}errors.html")
+    browser.wait(lambda: "2 sensors" in browser.text("about"))
+    trials = answers(opened)[1]["trials"]
+    wrong = misread(errors_of(opened, {"do": "errors", "sensors": [2, 8]}))
+    body = browser.driver.find_element(By.TAG_NAME, "body")
+    body.send_keys("nn")
+    browser.wait(lambda: browser.text("selection-heading").startswith(f"{trials[wrong[1]]}: "))
+    cards(browser, 1)
+    browser.click("drop")
+    browser.wait(lambda: "of 71 trials misread" in browser.text("about"))
+    # Without the trial, others may be recognised otherwise.
+    again = misread(errors_of(opened, {"do": "errors", "sensors": [2, 8]}))
+    following = next(trial for trial in again if trial >= wrong[1])
+    body.send_keys("n")
+    browser.wait(lambda: browser.text("selection-heading").startswith(f"{trials[following + 1]}: "))
+
+
+def test_a_damaged_log_is_said(browser: Browser, studio: Start, people: GraspSet, tmp_path: Path) -> None:
+    """A last line that a kill left is ignored; another one has to be corrected."""
+    opened, log = studio(), tmp_path / "recorded" / "edits.jsonl"
+    change(log, [trials_of("set.grasps", people)[0]], "")
+    whole = log.read_text()
+    log.write_text(whole + whole[:30])
+    opened.changed()
+    open_errors(browser, opened)
+    browser.wait(lambda: browser.texts("#unused li") == [f"{log}: line 2, the last, is damaged, and was ignored"])
+    assert browser.text("about").endswith("of 71 trials misread")
+    log.write_text(whole[:30] + "\n" + whole)
+    opened.changed()
+    browser.wait(lambda: browser.text("empty").startswith(f"{log}: line 1 is no edit: "))
+    assert browser.axe() == []
+    # Nothing is appended to it.
+    *_, refused = answers(opened, {"do": "undo"})
+    assert f"{log}: line 1 is no edit" in refused["why"]
+
+
 def test_the_sensors_of_choose_are_used_also_after_a_reload(browser: Browser, studio: Start) -> None:
     opened = studio()
     choose_two(browser, opened)
@@ -346,6 +407,7 @@ def test_a_build_says_what_it_was_trained_on(
     cards(browser, len(misread(reply)))
     assert said(browser, "#trials article li")
     # A build that cannot read these recordings is not offered.
+    browser.driver.get("about:blank")
     opened.close()
     others = replace(people, switch_names=tuple(f"pad {number}" for number in range(8)))
     opened = studio(others)

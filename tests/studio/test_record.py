@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -13,11 +15,13 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.taxonomy import published
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.runtime.recording.guide import read_journal
 from thenar.studio import Project, Studio
 
 from ..browser import Browser
+from ..sets import grasp_set_of
 
 Start = Callable[..., Studio]
 PATIENCE_S = 30
@@ -99,6 +103,24 @@ def hold(browser: Browser, board: BoardSender) -> None:
 def open_record(browser: Browser, studio: Studio, **how: int | str) -> None:
     browser.open(f"{studio.server.url}record.html", **how)  # type: ignore[arg-type]
     browser.wait(lambda: browser.text("link").startswith("page: connected"))
+
+
+def test_more_trials_of_two_types_are_recorded(
+    browser: Browser, studio: Start, folder: Path, board: BoardSender
+) -> None:
+    """As the page Errors asks for with a link: of the taxonomy of the recordings, without the empty hand."""
+    kamakura, labels = published("kamakura14"), np.arange(12) % 3
+    known = grasp_set_of(kamakura.types, labels, switches=np.eye(3)[labels], subjects=np.repeat(["A", "B"], 6))
+    replace(known, taxonomy=kamakura).save(folder / "set.grasps")
+    page = studio(None)
+    browser.open(f"{page.server.url}record.html?type=Tip&type=Lat&repetitions=3")
+    browser.wait(lambda: browser.script("return document.getElementById('taxonomy').value") == "kamakura14")
+    assert browser.text("only") == "Only of Tip and Lat."
+    browser.driver.find_element(By.ID, "subject").send_keys("Anna")
+    browser.click("start")
+    browser.wait(lambda: browser.text("place").startswith("1 of 6"))
+    assert browser.text("prompt").split(" ")[0] in ("Tip", "Lateral")
+    assert browser.axe() == []
 
 
 def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
@@ -233,6 +255,7 @@ def test_it_can_be_used_by_everybody(
         ({"do": "record", "name": "Anna", "id": "kamakura14", "value": 1e9}, "whole number from 1"),
         ({"do": "record", "name": "Anna", "id": "kamakura14", "value": 2.5}, "whole number from 1"),
         ({"do": "record", "name": "Anna", "id": "kamakura14"}, "whole number from 1"),
+        ({"do": "record", "name": "Anna", "id": "kamakura14", "value": 2, "ids": ["spoon"]}, "is not a grasp type of"),
         ({"do": "continue", "id": "../glove.toml"}, "the project has no recording"),
         ({"do": "key", "name": "explode"}, "there is no key"),
         ({"do": "key", "name": "accept"}, "nothing is recorded now"),
