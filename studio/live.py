@@ -34,7 +34,7 @@ class StudioLive:
             "replay": lambda asked: self._replay(asked.ids).about,
             **dict.fromkeys(("overview", "moments"), self._reply),
         }
-        studio.add("live.html", "Live", requests, self.read)
+        studio.add(requests, self.read)
         studio.closing.callback(self._close)
 
     def read(self, _: Report) -> None:

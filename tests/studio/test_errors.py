@@ -19,10 +19,10 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import select_inputs
 from thenar.runtime import Build
 from thenar.runtime.recipe import Recipe
-from thenar.studio import Studio
 from thenar.studio.errors import BuildReading
 from thenar.studio.project import Project
 from thenar.studio.quick import QuickAccuracy
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of, single_settings

@@ -15,7 +15,8 @@ from websockets.typing import Origin
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.runtime.recording.guide import read_journal
-from thenar.studio import Project, Studio
+from thenar.studio.project import Project
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 
