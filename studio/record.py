@@ -150,11 +150,9 @@ class RecordPage:
         harness, (_, build) = self._project.wiring(), self._wearer.base()
         if lacking := Glove(build, harness).system.unread:
             raise SettingError(lacking)
-        wearer, (types, tasks) = (
-            self._project.state.wearer,
-            tasks_of(build.manifest, [asked.name] if asked.name else []),
-        )
-        often = _TAUGHT if asked.name else _OFTEN
+        added = [asked.name] if asked.name else []
+        wearer, (types, tasks) = self._project.state.wearer, tasks_of(build.manifest, added)
+        often = _TAUGHT if added else _OFTEN
         drawn, checksum = secrets.randbits(32), build.manifest.checksum
         wanted = Collection(wearer, types.name, types.types, tasks, often, drawn, checksum)
         for _, path, begun, _, _ in self._unfinished():

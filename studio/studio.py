@@ -37,8 +37,10 @@ _LOOK_S = 0.2
 _LASTS_S = 2.0
 # What ends what else uses the glove; a recording is only ended on its page.
 _WATCHING = ("watching", "looking", "calibrating")
-_ENDED_BY = dict.fromkeys(_WATCHING, _WATCHING) | {"live": _WATCHING}
-_ENDED_BY |= dict.fromkeys(("recording", "wearer"), (*_WATCHING, "live"))
+_ENDED_BY: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys((*_WATCHING, "live"), _WATCHING),
+    **dict.fromkeys(("recording", "wearer"), (*_WATCHING, "live")),
+}
 Report = Callable[[int, int], None]
 
 _log = logging.getLogger("thenar")
@@ -169,11 +171,12 @@ class Studio(Closing):
                 self.publish("work", message("work", done=1, total=1, what=what))
                 if what != "reading":
                     took = round(monotonic() - self._began_s, 1)
-                    self.project.remember(took=self.project.state.took | {what: took})
+                    # A folder that cannot be written to is read all the same.
+                    with suppress(OSError):
+                        self.project.remember(took=self.project.state.took | {what: took})
                     self._show_members()
-            except (ThenarError, OSError, BrokenExecutor) as reason:
-                # Parameters are named between backticks, for commands to spell.
-                self.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
+            except Exception as reason:
+                self.publish("work", message("work", done=0, total=0, why=_sentence(reason)))
 
     def close(self) -> None:
         """End what uses the glove, and close the pages."""
@@ -236,7 +239,7 @@ class Station:
         Returns at once: a device may take seconds to end. Raises SettingError if the glove is used for something that
         this may not end.
         """
-        if self.doing and (doing not in _ENDED_BY or self.doing not in _ENDED_BY[doing]):
+        if self.doing and self.doing not in _ENDED_BY[doing]:
             raise SettingError(f"the glove is in use: {self.doing}; end that first")
         self._stop.set()
         self._stop, self.doing = Event(), doing
@@ -262,11 +265,8 @@ class Station:
         try:
             if not stop.is_set():
                 work(stop)
-        except (ThenarError, OSError) as reason:
-            why = str(reason)
-        except Exception as fault:  # a bug of ours, which must not leave the glove in use
-            _log.exception("the glove: a bug in the program")
-            why = f"a bug in thenar: {type(fault).__name__}"
+        except Exception as reason:
+            why = _sentence(reason)
         if stop is self._stop:
             self.doing = ""
         self._tell(self.doing, why)
@@ -275,6 +275,15 @@ class Station:
         self._publish("station", message("station", doing=doing, why=why))
         if not doing:
             self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
+
+
+def _sentence(reason: Exception) -> str:
+    """Return why something failed. A bug of ours is logged, and ends neither the pages nor a recording."""
+    if isinstance(reason, ThenarError | OSError | BrokenExecutor):
+        # Parameters are named between backticks, for commands to spell.
+        return str(reason).replace("``", "")
+    _log.error("the studio: a bug in the program", exc_info=reason)
+    return f"a bug in thenar: {type(reason).__name__}"
 
 
 def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
