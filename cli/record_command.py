@@ -140,7 +140,8 @@ def command(
         types, tasks = collected(taxonomy or "kamakura14", objects, _with_none(journal) if none is None else none)
     drawn = secrets.randbits(32) if seed is None else seed
     repetitions = repetitions or (100 if build is None else 3 if add_type else 2)
-    wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
+    checksum = "" if loaded is None else loaded.manifest.checksum
+    wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn, checksum)
     if journal is not None:
         wanted = _resumed(journal, wanted, seed)
     done, total = 0 if journal is None else len(journal.accepted), len(planned(wanted))

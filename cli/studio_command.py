@@ -34,7 +34,8 @@ def command(folder: Path, jobs: int, web: str, web_token: str | None) -> None:
 
 def serve(folder: Path, web: str, web_token: str | None, page: str = "", *, wearer: str = "", jobs: int = -1) -> None:
     """Serve the studio of a folder until it is ended, with a page first: by default the one that is next to be used."""
-    from thenar.studio import Project, open_studio
+    from thenar.studio.opening import open_studio
+    from thenar.studio.project import Project
 
     project = Project(folder, hand_of(None))
     if wearer:

@@ -53,7 +53,7 @@ class ChoosePage:
             "use": self._use,
             **dict.fromkeys(("measure", "curve", "train"), self._later),
         }
-        studio.add("choose.html", "Choose", requests, self.read)
+        studio.add(requests, self.read)
 
     def read(self, report: Report) -> None:
         """Read the project's recordings, and show them; until then pages get those before."""

@@ -35,7 +35,7 @@ def add_compare_page(studio: Studio) -> None:
         "commands": partial(_commands, studio),
         **dict.fromkeys(("report", "firmware"), partial(_queue, studio)),
     }
-    studio.add("compare.html", "Compare", requests)
+    studio.add(requests)
     studio.publish("targets", message("targets", targets=[(name, target.help) for name, target in TARGETS.items()]))
 
 

@@ -107,7 +107,7 @@ class ErrorsPage:
         self._studio, self._project, self._choose = studio, studio.project, choose
         self._build: BuildReading | None = None
         requests: dict[str, Handler] = {"errors": self._errors, "trials": self._trials}
-        studio.add("errors.html", "Errors", requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
+        studio.add(requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
 
     def read(self, report: Report) -> None:
         """Let the build in use recognise the recordings, if it can, and show what was edited."""

@@ -66,7 +66,7 @@ class GlovePage:
             "calibrate": self._on_calibrate,
             "step": self._on_step,
         }
-        studio.add("glove.html", "Glove", requests, self.read)
+        studio.add(requests, self.read)
 
     def read(self, report: Report) -> None:
         """Show the glove of the project, or what one can be connected to."""
@@ -87,19 +87,12 @@ class GlovePage:
     def _sensors(self) -> GloveSensors:
         return GloveSensors(self._project.wiring(), self._project.hand())
 
-    def _start(self, doing: str, work: Callable[[Event], None]) -> None:
-        """Use the glove, unless somebody records or runs with it."""
-        now = self._studio.station.doing
-        if now not in ("", "watching", "calibrating", "looking"):
-            raise SettingError(f"the glove is in use: {now}; end that first")
-        self._studio.station.start(doing, work)
-
     def _on_find(self, asked: Asked) -> None:
         """Listen at an address, and propose a glove.toml."""
         if fault := "is not an address of rows" if asked.name == "-" else line_port_fault(asked.name):
             raise SettingError(f"{shortened(repr(asked.name))} {fault}")
         self._proposal = ""
-        self._start("looking", partial(self._find, asked.name))
+        self._studio.station.start("looking", partial(self._find, asked.name))
 
     def _find(self, port: str, stop: Event) -> None:
         self._studio.publish("found", message("found", port=port, busy=True))
@@ -125,7 +118,7 @@ class GlovePage:
         self._studio.changed()
 
     def _on_watch(self, _asked: Asked) -> None:
-        self._start("watching", self._watch)
+        self._studio.station.start("watching", self._watch)
 
     def _watch(self, stop: Event) -> None:
         try:
@@ -201,7 +194,7 @@ class GlovePage:
         if work is None or not self._project.harness.exists():
             raise SettingError("joints or pads of a glove.toml can be calibrated")
         self._keys = SimpleQueue()
-        self._start("calibrating", partial(self._calibrate, work))
+        self._studio.station.start("calibrating", partial(self._calibrate, work))
 
     def _calibrate(self, work: Callable[[Event], None], stop: Event) -> None:
         try:

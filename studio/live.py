@@ -26,15 +26,16 @@ class StudioLive:
         # The checksum of the build that runs; and set when another came into use.
         self._running, self._swap = "", Event()
         self._unread = ""  # a sentence on inputs that the running build lacks on this glove
-        self._replays = dict[tuple[str, ...], Replay]()
+        # By their ids, with the recording's size and time of change: one that was continued is read anew.
+        self._replays = dict[tuple[str, ...], tuple[tuple[int, int], Replay]]()
         requests: dict[str, Handler] = {
             "run": self._run,
             "halt": lambda _: studio.station.stop() if studio.station.doing == "live" else None,
             "use-build": self._use,
-            "replay": lambda asked: self._replay(asked.ids).about,
+            "replay": lambda asked: self._replay(asked.ids, anew=True).about,
             **dict.fromkeys(("overview", "moments"), self._reply),
         }
-        studio.add("live.html", "Live", requests, self.read)
+        studio.add(requests, self.read)
         studio.closing.callback(self._close)
 
     def read(self, _: Report) -> None:
@@ -93,23 +94,28 @@ class StudioLive:
         self._project.remember(build=self._project.path("build", asked.id).name)
         self._studio.changed()
 
-    def _replay(self, ids: tuple[str, ...]) -> Replay:
-        """Return a recording, the first id, with builds, the others, or with the build in use."""
+    def _replay(self, ids: tuple[str, ...], *, anew: bool = False) -> Replay:
+        """Return a recording, the first id, with builds, the others, or with the build in use; `anew`: as it is now."""
         used = [member.id for member in self._project.members("build") if member.name == self._project.state.build]
         key = (*ids, *used) if len(ids) == 1 else ids
         if not 2 <= len(key) <= 3:
             raise ThenarError("choose a recording, and one build or two")
-        if key not in self._replays:
-            recording, *builds = key
-            folders = [self._project.path("build", build) for build in builds]
-            self._replays[key] = Replay(self._project.path("recording", recording), folders)
+        if anew or key not in self._replays:
+            path = self._project.path("recording", key[0])
+            state = path.stat()
+            version = state.st_size, state.st_mtime_ns
+            if key not in self._replays or self._replays[key][0] != version:
+                made = Replay(path, [self._project.path("build", build) for build in key[1:]])
+                if key in self._replays:
+                    self._replays.pop(key)[1].close()
+                self._replays[key] = version, made
             for old in list(self._replays)[:-_MOST_REPLAYS]:
-                self._replays.pop(old).close()
-        return self._replays[key]
+                self._replays.pop(old)[1].close()
+        return self._replays[key][1]
 
     def _reply(self, asked: Asked) -> bytes:
         return self._replay(asked.ids).reply(asked.do, asked.numbers)
 
     def _close(self) -> None:
-        for replay in self._replays.values():
+        for _, replay in self._replays.values():
             replay.close()

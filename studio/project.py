@@ -4,6 +4,7 @@ import hashlib
 import os
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from shlex import join, quote
 
@@ -16,7 +17,7 @@ from thenar.compiler.recordings.edits import TrialId, apply_edits
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.drivers.errors import SettingError, ThenarError
-from thenar.runtime.build import Build
+from thenar.runtime.build import Build, load_manifest
 from thenar.runtime.files import write_atomically
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
@@ -90,9 +91,14 @@ class Project:
         write_atomically(self._state, msgspec.json.format(msgspec.json.encode(self.state)))
 
     def members(self, kind: str) -> list[Member]:
-        """Return the members of a kind, "set", "recording" or "build", by name."""
-        paths = [path.parent if kind == "build" else path for path in self.folder.glob(_KINDS[kind])]
-        return [Member(_id(path.name), kind, path.name) for path in sorted(paths)]
+        """Return the members of a kind, "set", "recording" or "build", by name.
+
+        Links are followed, also out of the folder: its owner made them, and no page can make one.
+        """
+        found = sorted(path for path in self.folder.glob(_KINDS[kind]) if path.exists())
+        names = [path.parent.name if kind == "build" else path.name for path in found]
+        # A name that is no text cannot be sent to a page.
+        return [Member(_id(name), kind, name) for name in names if name == name.encode(errors="ignore").decode()]
 
     def path(self, kind: str, member: str) -> Path:
         """Return the path of a member. Raises SettingError if there is none of this id."""
@@ -154,7 +160,9 @@ class Project:
         return self.folder / "glove.toml"
 
     def wiring(self) -> Harness:
-        """Return the harness. Raises HarnessError or OSError."""
+        """Return the harness. Raises SettingError if there is none, HarnessError or OSError."""
+        if not self.harness.exists():
+            raise SettingError("the project has no glove.toml: connect a glove on the page Glove first")
         return load_harness(self.harness)
 
     def hand(self) -> HandShape:
@@ -177,6 +185,16 @@ class Project:
         path = self.folder / self.state.build
         return (path, Build.load(path)) if self.state.build and (path / "build.json").exists() else None
 
+    def build_of(self, checksum: str) -> tuple[Path, Build] | None:
+        """Return the folder of the build with a checksum, and the build; None without one. Raises BuildError."""
+        for member in self.members("build"):
+            path = self.folder / member.name
+            # One that is damaged, or half written by another process, is not the one.
+            with suppress(ThenarError, OSError):
+                if load_manifest(path).checksum == checksum:
+                    return path, Build.load(path)
+        return None
+
     def new_path(self, name: str, ending: str = "", *others: str) -> Path:
         """Return the path of a new member: its name, with a number if a file with one of the endings has it already.
 
@@ -184,7 +202,8 @@ class Project:
         """
         if reason := fault(name):
             raise SettingError(f"the name {shortened(repr(name))} {reason}")
-        if "/" in name or name.startswith(".") or len(os.fsencode(name)) > _LONGEST:
+        # A name that begins with - would be an option of the commands that pages show.
+        if "/" in name or name.startswith((".", "-")) or len(os.fsencode(name)) > _LONGEST:
             raise SettingError(f"the name {shortened(repr(name))} is not possible: use some letters, digits and spaces")
         for number in range(1, 10_000):
             stem = name if number == 1 else f"{name}-{number}"
@@ -212,4 +231,4 @@ def _fitting(sets: dict[str, GraspSet]) -> tuple[dict[str, GraspSet], list[str]]
 
 
 def _id(name: str) -> str:
-    return hashlib.sha256(name.encode("utf-8", "surrogateescape")).hexdigest()[:12]
+    return hashlib.sha256(name.encode()).hexdigest()[:12]

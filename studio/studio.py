@@ -5,19 +5,21 @@ thread if it takes milliseconds. Longer work is queued and done one at a time, b
 "work". The devices of the glove have one user at a time, whose thread the `Station` keeps.
 """
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from time import monotonic
+from typing import Any
 
 import msgspec
 
 from thenar.drivers.closing import Closing
-from thenar.drivers.errors import ThenarError
+from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.published import DeviceHealth
 from thenar.runtime.web.live import shell_message
 from thenar.runtime.web.server import Message, Server, message
@@ -25,11 +27,23 @@ from thenar.runtime.web.server import Message, Server, message
 from .project import Project
 
 PAGES = Path(__file__).parent / "pages"
+# The file and the title of each page, in the order of the links.
+_TITLES = [
+    (f"{title.lower()}.html", title) for title in ("Glove", "Record", "Choose", "Errors", "Live", "Wearer", "Compare")
+]
 _MOST_QUEUED = 8
 _LOOK_S = 0.2
 # What is said of devices is old after this time.
 _LASTS_S = 2.0
+# What ends what else uses the glove; a recording is only ended on its page.
+_WATCHING = ("watching", "looking", "calibrating")
+_ENDED_BY: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys((*_WATCHING, "live"), _WATCHING),
+    **dict.fromkeys(("recording", "wearer"), (*_WATCHING, "live")),
+}
 Report = Callable[[int, int], None]
+
+_log = logging.getLogger("thenar")
 
 
 class Asked(msgspec.Struct, frozen=True):
@@ -88,7 +102,6 @@ class Studio(Closing):
     ) -> None:
         self.project, self.jobs = project, jobs
         self._requests: dict[str, Handler] = {"cancel": self._cancel}
-        self._titles = list[tuple[str, str]]()
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
         self._stale = False
@@ -97,14 +110,11 @@ class Studio(Closing):
         self.station = Station(self.server.publish)
         self.closing = ExitStack()
 
-    def add(
-        self, file: str, title: str, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None
-    ) -> None:
-        """Add a page: its file in pages/, its title, and what carries out its requests, by their `do`.
+    def add(self, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None) -> None:
+        """Add what carries out the requests of a page, by their `do`.
 
         `read` is queued whenever the project has changed: it publishes what the page shows of it.
         """
-        self._titles.append((file, title))
         self._requests |= requests
         self._readers += [] if read is None else [read]
 
@@ -123,10 +133,12 @@ class Studio(Closing):
 
     def changed(self) -> None:
         """Show the project as it is now, after a set or a build came, went or changed."""
-        built = self.project.build()
-        about = () if built is None else (built[0], built[1].manifest)
-        state = self.project.state
-        self.publish("shell", shell_message(self.project.name, *about, pages=self._titles, wearer=state.wearer))
+        about, state = tuple[Any, ...](), self.project.state
+        # What is wrong with a build is told by the pages that read it.
+        with suppress(ThenarError, OSError):
+            built = self.project.build()
+            about = () if built is None else (built[0], built[1].manifest)
+        self.publish("shell", shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer))
         self._show_members()
         # Of several changes the last is read: a recording or a build may come while another is read.
         if not self._stale:
@@ -134,15 +146,15 @@ class Studio(Closing):
             self._queue.put(("reading", self._read))
 
     def _read(self, report: Report) -> None:
-        self._stale, reasons = False, list[Exception]()
+        """Let every page read the project. Raises the first error once all have tried."""
+        self._stale, wrong = False, list[Exception]()
         for read in self._readers:
-            # What one page cannot read, others may not need.
             try:
                 read(report)
             except (ThenarError, OSError) as reason:
-                reasons.append(reason)
-        if reasons:
-            raise reasons[0]
+                wrong.append(reason)
+        if wrong:
+            raise wrong[0]
 
     def run(self, stop: Event) -> None:
         """Do what pages ask for, until `stop` is set."""
@@ -159,15 +171,16 @@ class Studio(Closing):
                 self.publish("work", message("work", done=1, total=1, what=what))
                 if what != "reading":
                     took = round(monotonic() - self._began_s, 1)
-                    self.project.remember(took=self.project.state.took | {what: took})
+                    # A folder that cannot be written to is read all the same.
+                    with suppress(OSError):
+                        self.project.remember(took=self.project.state.took | {what: took})
                     self._show_members()
-            except (ThenarError, OSError, BrokenExecutor) as reason:
-                # Parameters are named between backticks, for commands to spell.
-                self.publish("work", message("work", done=0, total=0, why=str(reason).replace("``", "")))
+            except Exception as reason:
+                self.publish("work", message("work", done=0, total=0, why=_sentence(reason)))
 
     def close(self) -> None:
         """End what uses the glove, and close the pages."""
-        self.station.stop()
+        self.station.close()
         self.server.close()
         self.closing.close()
 
@@ -199,7 +212,10 @@ class Studio(Closing):
         handler = self._requests.get(asked.do)
         if handler is None:
             raise ThenarError(f"a page cannot {asked.do[:20]!r}")
-        return handler(asked)
+        try:
+            return handler(asked)
+        except OSError as reason:  # the folder is read-only, full or gone
+            raise ThenarError(str(reason)) from None
 
 
 class Station:
@@ -218,33 +234,56 @@ class Station:
         self._tell("")
 
     def start(self, doing: str, work: Callable[[Event], None]) -> None:
-        """End what uses the glove, and start this: `work` gets an event that is set when it is to end."""
-        self.stop()
+        """End what uses the glove, and then start this: `work` gets an event that is set when it is to end.
+
+        Returns at once: a device may take seconds to end. Raises SettingError if the glove is used for something that
+        this may not end.
+        """
+        if self.doing and self.doing not in _ENDED_BY[doing]:
+            raise SettingError(f"the glove is in use: {self.doing}; end that first")
+        self._stop.set()
         self._stop, self.doing = Event(), doing
-        self._thread = Thread(target=self._run, args=(doing, work, self._stop), name=f"thenar {doing}", daemon=True)
+        follow = partial(self._run, doing, work, self._stop, self._thread)
+        self._thread = Thread(target=follow, name=f"thenar {doing}", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End what uses the glove."""
+        """Let what uses the glove end soon."""
         self._stop.set()
+
+    def close(self) -> None:
+        """End what uses the glove."""
+        self.stop()
         if self._thread is not None:
             self._thread.join()
-        self._thread = None
 
-    def _run(self, doing: str, work: Callable[[Event], None], stop: Event) -> None:
+    def _run(self, doing: str, work: Callable[[Event], None], stop: Event, before: Thread | None) -> None:
+        if before is not None:
+            before.join()
         self._tell(doing)
         why = ""
         try:
-            work(stop)
-        except (ThenarError, OSError) as reason:
-            why = str(reason)
-        self.doing = ""
-        self._tell("", why)
+            if not stop.is_set():
+                work(stop)
+        except Exception as reason:
+            why = _sentence(reason)
+        if stop is self._stop:
+            self.doing = ""
+        self._tell(self.doing, why)
 
     def _tell(self, doing: str, why: str = "") -> None:
         self._publish("station", message("station", doing=doing, why=why))
         if not doing:
             self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
+
+
+def _sentence(reason: Exception) -> str:
+    """Return why something failed. A bug of ours is logged, and ends neither the pages nor a recording."""
+    if isinstance(reason, ThenarError | OSError | BrokenExecutor):
+        # Parameters are named between backticks, for commands to spell.
+        return str(reason).replace("``", "")
+    _log.error("the studio: a bug in the program", exc_info=reason)
+    return f"a bug in thenar: {type(reason).__name__}"
 
 
 def glove_message(devices: Sequence[DeviceHealth]) -> bytes:

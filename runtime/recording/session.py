@@ -33,10 +33,12 @@ class CollectionTask(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=_MOST_OBJECTS)]
 
 
-class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The plan of a collection: `repetitions` of every task in an order drawn from `seed`.
 
     `types` are those of the taxonomy, all of them and in its order; `tasks` may be fewer.
+    `build` is the checksum of the build that the trials are to adapt, whose codes their set gets; empty: they are for
+    none.
     """
 
     subject: str
@@ -45,6 +47,7 @@ class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tasks: Annotated[tuple[CollectionTask, ...], msgspec.Meta(max_length=_MOST_TYPES)]
     repetitions: Annotated[int, msgspec.Meta(ge=1, le=MOST_TRIALS)]
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+    build: str = ""
 
 
 Event = Literal["begun", "captured", "accepted", "redone", "skipped", "undone"]

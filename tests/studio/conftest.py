@@ -15,7 +15,9 @@ from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.recipe import Recipe
 from thenar.simulator.handmaps.handmap import hand_map
-from thenar.studio import Project, Studio, open_studio
+from thenar.studio.opening import open_studio
+from thenar.studio.project import Project
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of, single_settings

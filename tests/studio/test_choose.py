@@ -23,9 +23,9 @@ from thenar.compiler.recordings.edits import trials_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build
 from thenar.runtime.recipe import Recipe
-from thenar.studio import Project, Studio
 from thenar.studio.edits import change
-from thenar.studio.studio import Report
+from thenar.studio.project import Project
+from thenar.studio.studio import Report, Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of

@@ -24,7 +24,7 @@ from thenar.compiler.artifact.comparing import compare_builds
 from thenar.compiler.artifact.documents import report_of_build
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime import Build
-from thenar.studio import Studio
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 

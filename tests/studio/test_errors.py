@@ -20,12 +20,11 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import select_inputs
 from thenar.runtime import Build
 from thenar.runtime.recipe import Recipe
-from thenar.studio import Studio
 from thenar.studio.edits import change
 from thenar.studio.errors import BuildReading
 from thenar.studio.project import Project
 from thenar.studio.quick import QuickAccuracy
-from thenar.studio.studio import Report
+from thenar.studio.studio import Report, Studio
 
 from ..browser import PATIENCE_S, Browser
 from ..sets import grasp_set_of, single_settings

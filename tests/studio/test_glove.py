@@ -18,7 +18,7 @@ from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.taxels import load_taxel_calibration
-from thenar.studio import Studio
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 

@@ -24,7 +24,7 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.studio import Studio
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 from ..sets import single_settings

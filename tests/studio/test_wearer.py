@@ -21,7 +21,8 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.runtime import Build
-from thenar.studio import Project, Studio
+from thenar.studio.project import Project
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of

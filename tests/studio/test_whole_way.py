@@ -11,7 +11,7 @@ from selenium.webdriver.support.select import Select
 
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.runtime import Build
-from thenar.studio import Studio
+from thenar.studio.studio import Studio
 
 from ..browser import Browser
 

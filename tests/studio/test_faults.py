@@ -1,0 +1,227 @@
+"""The studio while its project changes under it, and while the glove is used by several pages."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+import pytest
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from thenar.compiler import compile_build
+from thenar.compiler.hand import HandShape
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.drivers.emulated.lines import BoardSender, LineServer
+from thenar.drivers.errors import SettingError
+from thenar.runtime import Build
+from thenar.runtime.recording.guide import read_journal
+from thenar.runtime.web.server import message
+from thenar.studio.project import Project
+from thenar.studio.studio import Station, Studio
+
+from ..sets import grasp_set_of
+
+Start = Callable[..., Studio]
+PATIENCE_S = 30
+
+
+@contextmanager
+def page(opened: Studio, topics: str) -> Iterator[ClientConnection]:
+    address = opened.server.url.removeprefix("http://").rstrip("/")
+    with connect(f"ws://{address}/live?topics={topics}", origin=Origin(f"http://{address}"), proxy=None) as live:
+        yield live
+
+
+def until(live: ClientConnection, fits: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """Return the first message that fits."""
+    while not fits(told := json.loads(live.recv(timeout=PATIENCE_S))):
+        pass
+    return dict(told)
+
+
+def refusal(opened: Studio, **asked: object) -> str:
+    """Return why a request is refused."""
+    with page(opened, "none") as live:
+        live.send(json.dumps(asked))
+        return str(until(live, lambda told: told["topic"] == "refused")["why"])
+
+
+def test_a_build_that_is_half_written_hides_nothing_else(
+    studio: Start, two_builds: Path, hand: HandShape, tmp_path: Path
+) -> None:
+    folder = tmp_path / "recorded"
+    shutil.copytree(two_builds, folder)
+    Project(folder, hand).remember(build="more", wearer="A")
+    (folder / "more" / "build.json").write_bytes((folder / "more" / "build.json").read_bytes()[:100])
+    (folder / "half.grasps").write_bytes(b"half")
+    with page(studio(), "shell,set,recordings,wearing,work") as live:
+        shown = dict[str, Any]()
+        while not {"shell", "set", "recordings", "wearing"} <= {*shown} or "why" not in shown["work"]:
+            told = json.loads(live.recv(timeout=PATIENCE_S))
+            shown[told["topic"]] = told
+    assert shown["shell"]["build"] == ""
+    assert "build.json" in shown["wearing"]["why"]
+    assert "build.json" in shown["work"]["why"]
+    assert shown["set"]["name"] == "set.grasps"
+    assert [said.partition(" is")[0] for said in shown["set"]["unused"]] == ["half.grasps"]
+
+
+def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(
+    studio: Start, two_builds: Path, people: GraspSet, hand: HandShape, tmp_path: Path
+) -> None:
+    folder = tmp_path / "recorded"
+    shutil.copytree(two_builds, folder)
+    Project(folder, hand).remember(build="more", wearer="C")
+    people.rows(people.subjects == "C").save(folder / "C.grasps")
+    (folder / "half.grasps").write_bytes(b"half")
+    (folder / "few" / "build.json").write_bytes(b"{")
+    with page(studio(None), "wearing,adapted") as live:
+        shown = until(live, lambda told: bool(told["sets"]))
+        assert [one["name"] for one in shown["sets"]] == ["C.grasps"]
+        live.send(json.dumps({"do": "adapt", "ids": [one["id"] for one in shown["sets"]]}))
+        assert until(live, lambda told: told["topic"] == "adapted")["folder"] == "C"
+        assert until(live, lambda told: told.get("build") == "C")["base"] == "more"
+
+
+def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:
+    opened = studio()
+    shutil.rmtree(tmp_path / "recorded")
+    why = refusal(opened, do="wearer", name="B")
+    assert "No such file" in why
+    assert "studio.json" in why
+    assert "load the page again" in refusal(opened, do="use", id="0123456789ab")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_is_read_only_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:
+    opened = studio()
+    (tmp_path / "recorded").chmod(0o500)
+    try:
+        assert "Permission denied" in refusal(opened, do="wearer", name="B")
+    finally:
+        (tmp_path / "recorded").chmod(0o700)
+
+
+def test_links_are_followed_and_names_that_are_no_text_left_out(
+    people: GraspSet, hand: HandShape, tmp_path: Path
+) -> None:
+    folder, elsewhere = tmp_path / "mine", tmp_path / "disk"
+    folder.mkdir()
+    elsewhere.mkdir()
+    people.save(elsewhere / "all.grasps")
+    (folder / "linked.grasps").symlink_to(elsewhere / "all.grasps")
+    (folder / "gone.grasps").symlink_to(elsewhere / "gone.grasps")
+    (folder / 'naïve "set".grasps').symlink_to(elsewhere / "all.grasps")
+    Path(os.fsdecode(bytes(folder) + b"/\xff.grasps")).write_bytes(b"")
+    project = Project(folder, hand)
+    assert [one.name for one in project.members("set")] == ["linked.grasps", 'naïve "set".grasps']
+    assert len(project.recordings([folder / "linked.grasps"])[0]) == len(people)
+
+
+@pytest.mark.parametrize("name", ["-o", "--help", ".hidden", "a/b"])
+def test_a_name_that_a_command_or_a_folder_would_misread_is_refused(hand: HandShape, tmp_path: Path, name: str) -> None:
+    with pytest.raises(SettingError, match="is not possible"):
+        Project(tmp_path, hand).new_path(name)
+
+
+def test_a_station_waits_for_no_device_and_a_recording_is_ended_by_nobody() -> None:
+    told, slow, recorded = dict[str, object](), Event(), Event()
+
+    def watch(_: Event) -> None:
+        """Watch a device that is busy, and does not look whether it is to end."""
+        slow.wait()
+
+    def record(stop: Event) -> None:
+        recorded.set()
+        stop.wait()
+
+    station = Station(told.__setitem__)
+    station.start("watching", watch)
+    station.start("recording", record)
+    assert station.doing == "recording"
+    assert not recorded.is_set()
+    slow.set()
+    assert recorded.wait(PATIENCE_S)
+    for other in ("watching", "calibrating", "live", "recording", "wearer"):
+        with pytest.raises(SettingError, match="in use: recording"):
+            station.start(other, watch)
+    station.close()
+    assert station.doing == ""
+    assert told["station"] == message("station", doing="", why="")
+
+
+def test_a_bug_frees_the_glove_and_ends_no_studio(studio: Start, caplog: pytest.LogCaptureFixture) -> None:
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError
+
+    opened = studio()
+    with page(opened, "station,work") as live:
+        opened.station.start("watching", fail)
+        assert until(live, lambda told: bool(told.get("why")))["why"] == "a bug in thenar: ZeroDivisionError"
+        opened.queue("measure", fail)
+        assert until(live, lambda told: told["topic"] == "work" and "why" in told)["why"].endswith("ZeroDivisionError")
+        opened.changed()
+        assert until(live, lambda told: told.get("done") == 1)["what"] == "reading"
+    assert opened.station.doing == ""
+    assert len(caplog.records) == 2
+
+
+TYPES = ("cup", "pen")
+CLOSED = {"cup": {"s1": 1.0, "j1": 40.0}, "pen": {"s1": 0.0, "j1": 200.0}}
+
+
+@pytest.fixture
+def board() -> Iterator[tuple[LineServer, BoardSender]]:
+    with LineServer() as line, BoardSender(line.send, ("s1",), ("j1",), 200) as board:
+        yield line, board
+
+
+def lead(live: ClientConnection, board: BoardSender, done: int, doing: str) -> None:
+    """Accept trials of a collection that begins, and leave it when so many are done."""
+    told, step = until(live, lambda told: told["topic"] == "collecting" and told.get("doing") == doing), ""
+    while told["stage"] != "over":
+        before, step = step, str([told.get(name) for name in ("stage", "number", "done")])
+        board.show(CLOSED.get(told.get("prompt", ""), {}))
+        key = "quit" if told.get("done", 0) >= done else "accept"
+        if step != before and (key == "quit" or key in told.get("keys", {})):
+            live.send(json.dumps({"do": "key", "name": key}))
+        told = until(live, lambda told: told["topic"] == "collecting")
+
+
+@pytest.mark.slow
+def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
+    studio: Start, board: tuple[LineServer, BoardSender], hand: HandShape, tmp_path: Path
+) -> None:
+    """Its set has the codes of the build, and adapts it."""
+    folder, labels = tmp_path / "recorded", np.arange(40) % 2
+    folder.mkdir()
+    coding = Joint("j1", "deg", 0, 0.0, 250, 500.0)
+    codes = np.array([[20], [100]])[labels] + np.random.default_rng(2).integers(-9, 9, (40, 1))
+    crowd = grasp_set_of(
+        TYPES, labels, switches=labels[:, None] == 0, switch_names=("s1",), codes=codes, joints=(coding,)
+    )
+    compile_build(crowd, folder / "build", trainer="linear", folds=0, jobs=1, have=("s1", "j1"), sensors=2)
+    (folder / "glove.toml").write_text(
+        f'name = "bench"\n[[stream]]\nport = "{board[0].port}"\nrate_hz = 200\n'
+        'switches = ["s1"]\njoints = { j1 = [0, 254] }\n'
+    )
+    Project(folder, hand).remember(build="build")
+    opened = studio(None)
+    with page(opened, "collecting,station,adapted,recordings") as live:
+        live.send(json.dumps({"do": "wear"}))
+        lead(live, board[1], 1, "wearer")
+        until(live, lambda told: told["topic"] == "station" and not told["doing"])
+        assert len(read_journal(folder / "me.mcap").accepted) == 1
+        assert GraspSet.load(folder / "me.grasps").joints == (coding,)
+        (member,) = opened.project.members("recording")
+        live.send(json.dumps({"do": "continue", "id": member.id}))
+        lead(live, board[1], 4, "recording")
+        assert until(live, lambda told: told["topic"] == "adapted")["folder"] == "me"
+    assert GraspSet.load(folder / "me.grasps").joints == (coding,)
+    assert Build.load(folder / "me").manifest.adapted is not None
