@@ -1,12 +1,11 @@
 // The page Record: a collection is begun, led key by key, and ends with a set.
+import { percent, showKeys, trained } from "./choice.js";
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { list, say } from "./wire.js";
+import { $, button, fillMenu, list, make, say } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
-const percent = (share) => (100 * share).toFixed(1);
 const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
 
 let stage = "over";
@@ -30,20 +29,14 @@ const ask = openPage({
     $("start").disabled = !glove;
     say($("objects"), objects ? "Objects are those of objects.toml." : "");
     listed = objects;
-    const before = $("taxonomy").value;
-    $("taxonomy").replaceChildren(...taxonomies.map((name) => new Option(name === "own" && objects ? "own, of objects.toml" : name, name)));
-    $("taxonomy").value = taxonomies.includes(before) ? before : objects ? "own" : taxonomies[0];
+    const members = taxonomies.map((id) => ({ id, name: id === "own" && objects ? "own, of objects.toml" : id }));
+    fillMenu($("taxonomy"), members, objects ? "own" : taxonomies[0]);
     askTypes();
     $("unfinished").hidden = !unfinished.length;
-    const items = unfinished.map(({ id, name, subject, done, total }) => {
-      const item = document.createElement("li"), button = document.createElement("button");
-      button.type = "button";
-      button.textContent = `Continue ${name} of ${subject}: ${done} of ${total} trials are done`;
-      button.addEventListener("click", () => ask("continue", { id }));
-      item.append(button);
-      return item;
-    });
-    $("recordings").replaceChildren(...items);
+    $("recordings").replaceChildren(...unfinished.map(({ id, name, subject, done, total }) => {
+      const words = `Continue ${name} of ${subject}: ${done} of ${total} trials are done`;
+      return make("li", {}, button(words, () => ask("continue", { id })));
+    }));
   },
   collecting: (state) => show(state),
   trials: (message) => showTrials(message),
@@ -78,15 +71,7 @@ const ask = openPage({
     $("train").disabled = Boolean(why);
     if (why) say($("work"), why);
   },
-  work: ({ done, total, what, why }) => {
-    const busy = { reading: "reading", train: "training" }[what] ?? what;
-    say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
-  },
-  train: ({ folder, facts }) => {
-    $("build").hidden = false;
-    say($("build-heading"), `Trained: ${folder}`);
-    list($("facts"), facts);
-  },
+  train: trained,
   station: ({ why }) => {
     if (why) say($("refused"), why);
   },
@@ -113,7 +98,7 @@ function show(state) {
   if (stage === "waiting") {
     say($("prompt"), "Waiting for the glove …");
     for (const id of ["thing", "standing", "place"]) say($(id), "");
-    $("keys").replaceChildren();
+    leadBy({});
     return;
   }
   say($("place"), `${Math.min(number, total)} of ${total}; ${done} done${skipped ? `, ${skipped} skipped` : ""}`);
@@ -130,42 +115,29 @@ function show(state) {
     $("drawing").hidden = !known;
     say($("drawing-says"), known ? "" : `No picture of ${grasp}: hold the ${thing.replace(/^object /, "")} as you agreed.`);
   }
-  showKeys(keys);
+  leadBy(keys);
 }
 
-/** Show the keys that count now as buttons; the first is the one that Enter presses, and has the focus. */
-function showKeys(keys) {
-  const words = Object.entries(keys);
-  if (words.map(String).join() === $("keys").dataset.keys) return;
-  $("keys").dataset.keys = words.map(String).join();
+/** Show the keys that count now; the first is the one that Enter presses, and has the focus. */
+function leadBy(keys) {
   const focused = !document.activeElement || document.activeElement === document.body || $("leading").contains(document.activeElement);
-  const buttons = words.map(([key, what]) => {
-    const button = document.createElement("button"), letter = document.createElement("kbd");
-    button.type = "button";
-    button.className = key === words[0][0] ? "" : "plain";
-    button.dataset.key = key;
-    letter.textContent = LETTERS[key];
-    button.append(what, letter);
-    button.addEventListener("click", () => ask("key", { name: key }));
-    return button;
-  });
-  $("keys").replaceChildren(...buttons);
+  const first = showKeys(keys, (name) => ask("key", { name }), LETTERS);
   // During the countdown Enter is expected next, not now: no button takes it by accident.
-  if (focused && "accept" in keys) buttons[0].focus();
+  if (focused && "accept" in keys) first?.focus();
 }
 
 document.addEventListener("keydown", (event) => {
   if (stage === "over" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
-  const button = event.target.closest?.("button, a, input, select");
+  const presses = event.target.closest?.("button, a, input, select");
   const found = Object.entries(LETTERS).find(([, letter]) => letter === event.key || letter === event.key.toLowerCase());
-  if (!found || (event.key === "Enter" && button)) return;
+  if (!found || (event.key === "Enter" && presses)) return;
   event.preventDefault();
   ask("key", { name: found[0] });
 });
 
 function showTrials({ trials, types, accuracy }) {
   const styles = typeStyles(types);
-  $("type").replaceChildren(...types.filter((type) => type !== "none").map((type) => new Option(type, type)));
+  fillMenu($("type"), types.filter((type) => type !== "none").map((type) => ({ id: type, name: type })));
   $("so-far").hidden = !trials.length;
   $("seen").hidden = true;
   say($("accuracy"), accuracyWords(accuracy));
@@ -173,15 +145,9 @@ function showTrials({ trials, types, accuracy }) {
   const keep = same < 0 ? Math.min(strip.children.length, trials.length) : same;
   while (strip.children.length > keep) strip.lastChild.remove();
   for (const [trial, grasp, thing] of trials.slice(keep)) {
-    const item = document.createElement("li"), button = document.createElement("button");
-    item.dataset.trial = trial;
-    button.type = "button";
-    button.className = "plain";
-    button.append(`${trial} `, tag(styles, grasp), document.createElement("span"));
-    button.title = thing;
-    button.addEventListener("click", () => ask("recorded", { trial }));
-    item.append(button);
-    strip.append(item);
+    const show = button(`${trial} `, () => ask("recorded", { trial }), { class: "plain", title: thing });
+    show.append(tag(styles, grasp), make("span"));
+    strip.append(make("li", { "data-trial": trial }, show));
   }
   markTrials();
   $("strip-scroll").scrollLeft = strip.scrollWidth;

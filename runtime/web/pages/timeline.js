@@ -1,9 +1,8 @@
 // One axis of time for runs and recordings: lanes of spans on a canvas, a cursor, zoom, and keys. All times are in
 // microseconds.
 import { typeStyles } from "./types.js";
-import { say } from "./wire.js";
+import { $, say } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane

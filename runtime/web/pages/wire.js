@@ -1,7 +1,8 @@
-// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically. And texts on the page.
+// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically. And parts of the page.
 
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
+const SVG = "http://www.w3.org/2000/svg";
 
 /**
  * Connect to the server of this page.
@@ -39,24 +40,71 @@ export function connect(handlers) {
   };
 }
 
+export const $ = (id) => document.getElementById(id);
+
+/** Return a new element with these properties or attributes, and texts and elements in it. */
+export function make(kind, settings = {}, ...children) {
+  const element = document.createElement(kind);
+  for (const [name, value] of Object.entries(settings)) {
+    if (name in element) element[name] = value;
+    else element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+/** Return a new element of a drawing with these attributes, and texts and elements in it. */
+export function draw(kind, attributes = {}, ...children) {
+  const element = document.createElementNS(SVG, kind);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+/** Return a button. */
+export function button(text, onclick, settings = {}) {
+  return make("button", { type: "button", onclick, ...settings }, text);
+}
+
+/** Return a box to tick: its label, whose `control` is the box. */
+export function box(text, onchange, settings = {}) {
+  return make("label", {}, make("input", { type: "checkbox", onchange, ...settings }), text);
+}
+
 /** Set the text of an element if it differs: unchanged text is not read out again. */
 export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Return a cell of a table: "td", or "th" for the head of its row. */
-export function cell(kind, text) {
-  const made = document.createElement(kind);
-  if (kind === "th") made.scope = "row";
-  made.textContent = text;
-  return made;
+/** Say something in the element with this id, which is there only while there is something to say. */
+export function tell(id, text) {
+  $(id).hidden = !text;
+  say($(id), text || "");
 }
 
 /** Fill a list, changing only the entries that differ. */
 export function list(element, texts) {
   while (element.children.length > texts.length) element.lastChild.remove();
-  texts.forEach((text, at) => {
-    const item = element.children[at] ?? element.appendChild(document.createElement("li"));
-    say(item, text);
-  });
+  texts.forEach((text, at) => say(element.children[at] ?? element.appendChild(make("li")), text));
+}
+
+/** Fill the body of a table with rows of texts and elements, of which the first is the head of its row. */
+export function fillRows(body, rows) {
+  body.replaceChildren(...rows.map(([title, ...rest]) => {
+    return make("tr", {}, make("th", { scope: "row" }, title), ...rest.map((one) => make("td", {}, one)));
+  }));
+}
+
+/**
+ * Fill a menu with members {id, name}: what was chosen stays if it is still there, or else it is `usual`. A menu in a
+ * label is not shown without members.
+ */
+export function fillMenu(menu, members, usual = "") {
+  const before = menu.options.length ? menu.value : usual, ids = members.map(({ id }) => id);
+  const options = members.map(({ id, name }) => new Option(name, id));
+  const words = (some) => some.map(({ value, text }) => `${value} ${text}`).join("\n");
+  // A menu that is open stays open.
+  if (words(options) !== words([...menu.options])) menu.replaceChildren(...options);
+  menu.value = ids.includes(before) ? before : usual;
+  if (menu.parentElement.matches("label")) menu.parentElement.hidden = !members.length;
 }
