@@ -115,7 +115,7 @@ function matrix(trials) {
   });
   $("read").replaceChildren(make("td"), ...heads);
   const numbers = (some, label, kind) => button(some.length, () => select(some), { class: "plain", "aria-label": label, "data-is": kind });
-  fillRows($("confusion"), trials.flatMap((those, truth) => {
+  fillRows($("truth"), trials.flatMap((those, truth) => {
     if (!those.length) return [];
     const name = type(truth), wrong = those.filter(misread), title = numbers(wrong, `${name}: select its ${wrong.length} errors`, "");
     title.disabled = !wrong.length;
