@@ -1,8 +1,8 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
 import { interval, listBoxes, percent, storeChoice, storedChoice, trained } from "./choice.js";
-import { drawHand } from "./hand.js";
+import { draw, drawHand } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
-import { $, box, button, draw, fillRows, list, make, say, tell } from "./wire.js";
+import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
 
 const KINDS = { switch: "Switches", pad: "Pads", joint: "Joints" };
 
@@ -138,8 +138,8 @@ function certify() {
 
 function drawCurve({ points, of, enough }) {
   $("curve-panel").hidden = false;
-  say($("curve-of"), `${of}, %`);
-  fillRows($("points"), points.map((point) => {
+  const titles = ["Sensors", `${of}, %`, "Worth of the last, points", "After 2 own trials, %", ""];
+  fillTable("points", titles, points.map((point) => {
     const number = point.sensors.length;
     return [
       number === enough ? `${number}: more matter little` : number,

@@ -1,9 +1,9 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
 import { listBoxes, percent, ticked } from "./choice.js";
-import { drawHand } from "./hand.js";
+import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { $, draw, fillMenu, fillRows, list, make, say } from "./wire.js";
+import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 
 // Up: only b, down: only a; shapes differ as well as colours.
 const SIGNS = { both: "M0-4L4 0L0 4L-4 0Z", a: "M-4-3H4L0 4Z", b: "M-4 3H4L0-4Z" };
@@ -67,8 +67,6 @@ function show({ builds, hand, both, only, found, said, unused }) {
   $("result").hidden = false;
   say($("said"), said);
   list($("unused"), unused);
-  say($("name-a"), `a: ${builds[0].name}`);
-  say($("name-b"), `b: ${builds[1].name}`);
   const rows = [
     ["Recognised of these trials", ({ right, ends }) => `${percent(right / found.trials)} % [${ends.map(percent).join(", ")}]`],
     ["Sensors", (build) => build.sensors],
@@ -77,12 +75,13 @@ function show({ builds, hand, both, only, found, said, unused }) {
     ["Accuracy as compiled", (build) => build.stated],
     ...(builds[0].price === null ? [] : [["Price", ({ price }) => price.toFixed(2)]]),
   ];
-  fillRows($("both"), rows.map(([title, text]) => [title, ...builds.map(text)]));
+  fillTable("both", ["", `a: ${builds[0].name}`, `b: ${builds[1].name}`], rows.map(([title, text]) => [title, ...builds.map(text)]));
   overlay(hand, { both, a: only[0], b: only[1] }, builds);
   const styles = typeStyles([...found.types.map(({ grasp }) => grasp), ...found.changed.flatMap(({ a, b }) => [a, b])]);
-  fillRows($("types"), found.types.map(({ grasp, trials, a, b }) => [tag(styles, grasp), trials, a, b, points((b - a) / trials)]));
+  const types = found.types.map(({ grasp, trials, a, b }) => [tag(styles, grasp), trials, a, b, points((b - a) / trials)]);
+  fillTable("types", ["Type", "Trials", "a right", "b right", "Points"], types);
   say($("changed-heading"), `Trials that changed: ${found.changed.length || "none"}; ${found.better} better, ${found.worse} worse with b`);
-  fillRows($("changed"), found.changed.map((trial) => {
+  fillTable("changed", ["Trial", "True type", "a", "b"], found.changed.map((trial) => {
     const marked = [trial.a, trial.b].map((read) => {
       const right = read === trial.recorded;
       return make("span", { "data-is": right ? "good" : "bad" }, tag(styles, read), right ? " (right)" : "");

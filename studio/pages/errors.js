@@ -1,10 +1,10 @@
 // The page Errors: which trials are misread, in a matrix and on a map; the selected ones as small hands; and their edits.
 import { interval, storedChoice } from "./choice.js";
-import { drawHand } from "./hand.js";
+import { draw, drawHand } from "./hand.js";
 import { TrialMap } from "./map.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { $, box, button, draw, fillMenu, fillRows, list, make, say, tell } from "./wire.js";
+import { $, box, button, fillMenu, fillTable, list, make, say, tell } from "./wire.js";
 
 const percent = (share) => `${Math.round(100 * share)} %`;
 const STEP = 24; // the number of trials that are shown at a time
@@ -111,11 +111,11 @@ function matrix(trials) {
   const heads = reply.types.map((name) => {
     const label = tag(styles, name);
     label.lastChild.className = "unseen";
-    return make("th", { scope: "col", title: name }, label);
+    label.title = name;
+    return label;
   });
-  $("read").replaceChildren(make("td"), ...heads);
   const numbers = (some, label, kind) => button(some.length, () => select(some), { class: "plain", "aria-label": label, "data-is": kind });
-  fillRows($("truth"), trials.flatMap((those, truth) => {
+  fillTable("confusion", ["", ...heads], trials.flatMap((those, truth) => {
     if (!those.length) return [];
     const name = type(truth), wrong = those.filter(misread), title = numbers(wrong, `${name}: select its ${wrong.length} errors`, "");
     title.disabled = !wrong.length;

@@ -1,8 +1,8 @@
 // The page Glove: a glove is connected, watched and calibrated.
-import { drawHand } from "./hand.js";
+import { draw, drawHand } from "./hand.js";
 import { showKeys } from "./choice.js";
 import { openPage } from "./shell.js";
-import { $, button, draw, fillRows, list, make, say } from "./wire.js";
+import { $, button, fillTable, list, make, say } from "./wire.js";
 
 const PAST_S = 30, ASK_MS = 500;
 const KINDS = { joint: "joints", pad: "pads" };
@@ -70,11 +70,12 @@ function showFound({ port, busy, columns, rows, remarks, text, wrong }) {
   $("found").hidden = false;
   say($("found-heading"), busy ? `Listening to ${port}: press every switch and pad, bend every finger` : `${rows} rows came from ${port}`);
   $("connect").hidden = $("proposal").hidden = busy || wrong.length > 0;
-  $("columns-scroll").hidden = busy || !columns.length;
+  $("columns-table").hidden = busy || !columns.length;
   list($("remarks"), busy ? [] : [...wrong, ...remarks]);
   if (busy) return;
   say($("proposal"), text);
-  fillRows($("columns"), columns.map(({ column, least, greatest, taken_for }) => [column, least ?? "", greatest ?? "", taken_for ?? ""]));
+  const sent = columns.map(({ column, least, greatest, taken_for }) => [column, least ?? "", greatest ?? "", taken_for ?? ""]);
+  fillTable("columns", ["Column", "Least", "Greatest", "Taken for"], sent);
 }
 
 function showState(message) {
@@ -101,9 +102,9 @@ function showState(message) {
     connected ? error || "connected" : `lost: ${error}`,
     counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
   ]);
-  if (JSON.stringify(rows) === $("devices").dataset.rows) return;
-  $("devices").dataset.rows = JSON.stringify(rows);
-  fillRows($("devices"), rows);
+  if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
+  $("devices-table").dataset.rows = JSON.stringify(rows);
+  fillTable("devices", ["Device", "State", "Counted"], rows);
 }
 
 function choose(sensor) {

@@ -1,6 +1,5 @@
 // How the grasp types of the published taxonomies look: a posture of the hand, and the shape of the object in it.
-import { drawHand } from "./hand.js";
-import { draw } from "./wire.js";
+import { draw, drawHand } from "./hand.js";
 
 const FINGERS = ["index", "middle", "ring", "little"];
 

@@ -1,4 +1,5 @@
 // The map of trials: thousands of marks on a canvas, to hover over, click, or draw a line around.
+import { clearedPen, colours, redraw } from "./wire.js";
 
 const MARGIN = 14, REACH = 12; // pixels
 const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
@@ -12,6 +13,7 @@ export class TrialMap {
   #pointed = -1;
   #line = null; // the lasso while it is drawn
   #touch = false;
+  #closed = false; // whether the click to come ends a lasso
 
   /** on: { point(trial or -1), select(trials) } */
   constructor(canvas, on) {
@@ -39,11 +41,8 @@ export class TrialMap {
       this.#closed = false;
     });
     canvas.addEventListener("keydown", (event) => this.#press(event));
-    new ResizeObserver(() => this.#draw()).observe(canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
+    redraw(canvas, () => this.#draw());
   }
-
-  #closed = false; // whether the click to come ends a lasso
 
   /** Let a finger draw the lasso instead of scrolling. */
   set touch(on) {
@@ -73,12 +72,7 @@ export class TrialMap {
   }
 
   #draw() {
-    const canvas = this.#canvas, pen = canvas.getContext("2d"), colours = getComputedStyle(canvas);
-    const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
-    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
-    pen.clearRect(0, 0, wide, high);
-    const [text, page, bad, soft] = ["--text", "--page", "--bad", "--soft"].map((name) => colours.getPropertyValue(name));
+    const pen = clearedPen(this.#canvas), { text, page, bad, soft } = colours();
     const circle = (x, y, radius) => {
       pen.beginPath();
       pen.arc(x, y, radius, 0, 2 * Math.PI);
@@ -97,7 +91,7 @@ export class TrialMap {
       pen.lineWidth = chosen ? 3 : 1.5;
       pen.stroke();
     });
-    pen.font = `600 14px ${colours.fontFamily}`;
+    pen.font = "600 14px system-ui, sans-serif";
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     for (const label of this.#labels) {

@@ -2,7 +2,7 @@
 import { listBoxes, ticked } from "./choice.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { $, fillRows, list, say, tell } from "./wire.js";
+import { $, fillTable, list, say, tell } from "./wire.js";
 
 let state = null; // the message on the wearer and the build
 let begun = false; // whether this page has just begun to record
@@ -35,7 +35,8 @@ const ask = openPage({
     say($("worst"), `${type}: ${after} of ${count}`);
     list($("warnings"), result.warnings);
     const styles = typeStyles(result.types.map(([name]) => name));
-    fillRows($("types"), result.types.map(([name, ...counts]) => [tag(styles, name), ...counts]));
+    const rows = result.types.map(([name, ...counts]) => [tag(styles, name), ...counts]);
+    fillTable("types", ["Type", "Trials", "Before", "After"], rows);
     if (awaited) $("result-heading").focus();
     awaited = false;
   },

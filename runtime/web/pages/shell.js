@@ -18,6 +18,7 @@ export function openPage(handlers) {
   const badges = ["wearer", "glove-state", "build-state", "link"].map((id) => make("span", { id, class: "badge", hidden: true }));
   const title = make("h1", {}, make("span", { class: "brand" }, "thenar"), " ", make("span", { id: "name" }));
   const pages = make("nav", { id: "pages", "aria-label": "Pages" });
+  document.head.append(make("link", { rel: "icon", href: "icon.svg" }));
   document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages));
   link(false, "connecting");
   const send = connect({

@@ -2,7 +2,7 @@
 import { drawHand } from "./hand.js";
 import { counted, State } from "./state.js";
 import { chip, typeStyles } from "./types.js";
-import { $, fillRows, list, make, say, tell } from "./wire.js";
+import { $, fillTable, list, make, say, tell } from "./wire.js";
 
 const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
 const SETTLED_MS = 1000; // a text must be stable this long before it is read out
@@ -65,7 +65,7 @@ export class View {
 
   /** Take the health of devices and inputs. */
   health(report) {
-    fillRows($("devices"), report.devices.map(({ name, error, connected, counts }) => {
+    fillTable("devices", ["Device", "State", "Counted"], report.devices.map(({ name, error, connected, counts }) => {
       const counted = counts.filter(({ value }) => value).map((count) => `${count.name} ${count.value}`);
       return [name, error || (connected ? "connected" : "not connected"), counted.join(", ") || "nothing"];
     }));

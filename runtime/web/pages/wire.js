@@ -2,7 +2,6 @@
 
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
-const SVG = "http://www.w3.org/2000/svg";
 
 /**
  * Connect to the server of this page.
@@ -53,14 +52,6 @@ export function make(kind, settings = {}, ...children) {
   return element;
 }
 
-/** Return a new element of a drawing with these attributes, and texts and elements in it. */
-export function draw(kind, attributes = {}, ...children) {
-  const element = document.createElementNS(SVG, kind);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  element.append(...children);
-  return element;
-}
-
 /** Return a button. */
 export function button(text, onclick, settings = {}) {
   return make("button", { type: "button", onclick, ...settings }, text);
@@ -88,11 +79,16 @@ export function list(element, texts) {
   texts.forEach((text, at) => say(element.children[at] ?? element.appendChild(make("li")), text));
 }
 
-/** Fill the body of a table with rows of texts and elements, of which the first is the head of its row. */
-export function fillRows(body, rows) {
-  body.replaceChildren(...rows.map(([title, ...rest]) => {
+/**
+ * Make the table in the element with the id "<id>-table": its heads, and a body with this id, whose rows are texts and
+ * elements, of which the first is the head of its row.
+ */
+export function fillTable(id, titles, rows) {
+  const heads = titles.map((title) => (title === "" ? make("td") : make("th", { scope: "col" }, title)));
+  const lines = rows.map(([title, ...rest]) => {
     return make("tr", {}, make("th", { scope: "row" }, title), ...rest.map((one) => make("td", {}, one)));
-  }));
+  });
+  $(`${id}-table`).replaceChildren(make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", { id }, ...lines)));
 }
 
 /**
@@ -107,4 +103,26 @@ export function fillMenu(menu, members, usual = "") {
   if (words(options) !== words([...menu.options])) menu.replaceChildren(...options);
   menu.value = ids.includes(before) ? before : usual;
   if (menu.parentElement.matches("label")) menu.parentElement.hidden = !members.length;
+}
+
+/** Return the pen of a canvas, which is made as large as it is shown, and cleared: its unit is a pixel of the page. */
+export function clearedPen(canvas) {
+  const pen = canvas.getContext("2d");
+  const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
+  if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+  pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+  pen.clearRect(0, 0, wide, high);
+  return pen;
+}
+
+/** Return the page's colours by their names. */
+export function colours() {
+  const css = getComputedStyle(document.body), names = ["text", "soft", "page", "line", "warn", "bad"];
+  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).trim()]));
+}
+
+/** Let a canvas be drawn anew when its size or the page's colours change. */
+export function redraw(canvas, paint) {
+  new ResizeObserver(paint).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
 }
