@@ -1,6 +1,6 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
 import { interval, listBoxes, percent, storeChoice, storedChoice, trained } from "./choice.js";
-import { draw, drawHand } from "./hand.js";
+import { draw, drawHand, pressable } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
 import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
 
@@ -172,21 +172,15 @@ function drawFront(points, of) {
   parts.push(draw("path", { class: "front", d: `M${line}` }));
   svg.replaceChildren(...parts);
   for (const point of points) {
-    const number = point.sensors.length, label = `${number} sensors: ${interval(point)}`;
+    const number = point.sensors.length;
     const spot = draw(
       "g",
-      { class: "point", role: "button", tabindex: 0, "aria-label": label },
+      { class: "point" },
       draw("path", { d: `M${x(number)} ${y(point.low)}V${y(point.high)}` }),
       draw("circle", { cx: x(number), cy: y(point.mean), r: 5 }),
       draw("rect", { x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
     );
-    spot.addEventListener("click", () => detail(point, of));
-    spot.addEventListener("keydown", (event) => {
-      if (event.key !== "Enter" && event.key !== " ") return;
-      event.preventDefault();
-      detail(point, of);
-    });
-    svg.append(spot);
+    svg.append(pressable(spot, `${number} sensors: ${interval(point)}`, () => detail(point, of)));
   }
 }
 

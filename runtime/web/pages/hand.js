@@ -14,6 +14,19 @@ export function draw(kind, attributes = {}, ...children) {
   return element;
 }
 
+/** Make an element of a drawing a button, by pointer and keys, and return it. */
+export function pressable(element, name, press) {
+  const attributes = { role: "button", tabindex: 0, "aria-label": name, "aria-pressed": false };
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  element.addEventListener("click", press);
+  element.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    event.preventDefault();
+    if (!event.repeat) press();
+  });
+  return element;
+}
+
 const path = (points, closed) =>
   points.length ? `M${points.map(([x, y]) => `${x} ${-y}`).join(" ")}${closed ? "Z" : ""}` : "";
 
@@ -89,15 +102,7 @@ class Glove {
         if (!this.#closed[bit] === at < next) onSwitch(bit, at < next);
       });
     };
-    const button = { role: "button", tabindex: 0, "aria-label": one.name, "aria-pressed": false };
-    for (const [name, value] of Object.entries(button)) group.setAttribute(name, value);
-    group.append(area);
-    group.addEventListener("click", press);
-    group.addEventListener("keydown", (event) => {
-      if (event.key !== "Enter" && event.key !== " ") return;
-      event.preventDefault();
-      if (!event.repeat) press();
-    });
+    pressable(group, one.name, press).append(area);
     return spot;
   }
 

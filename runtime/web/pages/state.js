@@ -58,8 +58,3 @@ export class State {
     this.changed(old);
   }
 }
-
-/** Return a count of what can be read: "5 of 31 switches closed", "5 of 20 readable switches closed; 11 lost". */
-export function counted(count, total, lost, what) {
-  return lost ? `${count} of ${total - lost} readable ${what}; ${lost} lost` : `${count} of ${total} ${what}`;
-}

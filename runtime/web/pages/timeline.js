@@ -16,6 +16,7 @@ export class Track {
     this.announced = [];
     this.segments = [];
     this.health = [];
+    this.errors = { wrong: [], early: [] };
     this.untilUs = null;
   }
 
@@ -91,7 +92,6 @@ export class Timeline {
   last = null;
   at = null; // the cursor; null follows now
   dated = 0; // what makes time of day of a time of a run
-  #errors = []; // by track
   #from = 0;
   #span = USUAL_US;
   #whole = false; // while a recording is read, the window has all of it, until somebody zooms
@@ -106,7 +106,12 @@ export class Timeline {
   constructor(canvas, on) {
     this.canvas = canvas;
     this.on = on;
-    canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const { left, width } = canvas.getBoundingClientRect(), across = event.shiftKey ? event.deltaY : event.deltaX;
+      if (across) this.#pan((across / width) * this.#span);
+      else this.#zoom(1.002 ** event.deltaY, this.#from + ((event.clientX - left) / width) * this.#span);
+    }, { passive: false });
     for (const kind of ["down", "move", "up", "cancel"]) {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
@@ -163,8 +168,8 @@ export class Timeline {
     [this.first, this.last] = [first, last];
     if (fresh || this.#whole) this.#show(first, last - first);
     this.#whole = fresh || this.#whole;
-    this.#errors = this.tracks.map((track) => errors(this.truth, track.announced));
-    for (const id of ["next-error", "last-error"]) $(id).disabled = !this.#errors.some(({ wrong }) => wrong.length);
+    for (const track of this.tracks) track.errors = errors(this.truth, track.announced);
+    for (const id of ["next-error", "last-error"]) $(id).disabled = this.tracks.every(({ errors: { wrong } }) => !wrong.length);
     this.draw();
   }
 
@@ -199,11 +204,10 @@ export class Timeline {
   // Lanes of bars of a kind: types, troubles, or errors over what came before the right type, lower.
   #lanes() {
     const lanes = this.truth.length ? [["truth", ["type", this.truth]]] : [];
-    this.tracks.forEach(({ name, announced }, number) => {
-      const { wrong, early } = this.#errors[number] ?? { wrong: [], early: [] }, of = name && ` of ${name}`;
+    for (const { name, announced, errors: { wrong, early } } of this.tracks) {
       lanes.push([`announced${name && ` by ${name}`}`, ["type", announced]]);
-      if (this.truth.length) lanes.push([`error${of}; low: not yet announced`, ["early", early], ["wrong", wrong]]);
-    });
+      if (this.truth.length) lanes.push([`error${name && ` of ${name}`}; low: not yet announced`, ["early", early], ["wrong", wrong]]);
+    }
     const [{ name, segments, health }] = this.tracks, of = name && ` of ${name}`;
     return [...lanes, [`segments${of}`, ["type", segments]], [`health${of}, where it is not ok`, ["trouble", health]]];
   }
@@ -231,7 +235,13 @@ export class Timeline {
       pen.fillStyle = this.#colours.text;
       pen.fillRect(x(this.at) - 1, 0, 2, high - FOOT);
     }
-    this.#say();
+    const moved = this.at !== null || !this.live, seconds = (us) => (us / 1e6).toFixed(2);
+    say($("place"), this.reading);
+    $("now").hidden = !this.live || this.at === null;
+    // While it follows now, only its end moves: nothing to be read out.
+    canvas.setAttribute("aria-valuetext", moved ? this.reading : "now");
+    canvas.setAttribute("aria-valuemax", seconds(moved && this.last !== null ? this.last - this.first : 0));
+    canvas.setAttribute("aria-valuenow", seconds(this.at === null ? 0 : this.at - this.first));
   }
 
   #lane(pen, x, wide, name, bars, top) {
@@ -278,16 +288,6 @@ export class Timeline {
     }
   }
 
-  #say() {
-    const { canvas, reading, last, first } = this, moved = this.at !== null || !this.live;
-    say($("place"), reading);
-    $("now").hidden = !this.live || this.at === null;
-    // While it follows now, only its end moves: nothing to be read out.
-    canvas.setAttribute("aria-valuetext", moved ? reading : "now");
-    canvas.setAttribute("aria-valuemax", ((moved && last !== null ? last - first : 0) / 1e6).toFixed(2));
-    canvas.setAttribute("aria-valuenow", ((this.at === null ? 0 : this.at - first) / 1e6).toFixed(2));
-  }
-
   #show(from, span = this.#span) {
     const whole = Math.max(this.live ? KEPT_US : this.last - this.first, 1_000_000);
     this.#span = Math.min(Math.max(span, LEAST_US), whole);
@@ -309,13 +309,6 @@ export class Timeline {
     if (this.at === null) this.at = this.last; // it was dragged back: it stays there
     this.#show(this.#from + us);
     this.draw();
-  }
-
-  #wheel(event) {
-    event.preventDefault();
-    const { left, width } = this.canvas.getBoundingClientRect(), across = event.shiftKey ? event.deltaY : event.deltaX;
-    if (across) this.#pan((across / width) * this.#span);
-    else this.#zoom(1.002 ** event.deltaY, this.#from + ((event.clientX - left) / width) * this.#span);
   }
 
   // One pointer drags, two pinch; one that did not move puts the cursor.
@@ -344,7 +337,7 @@ export class Timeline {
   }
 
   #jump(by) {
-    const places = this.#errors.flatMap(({ wrong }) => wrong).map(({ from }) => from).sort((one, other) => one - other), at = this.at ?? this.last;
+    const places = this.tracks.flatMap(({ errors: { wrong } }) => wrong).map(({ from }) => from).sort((one, other) => one - other), at = this.at ?? this.last;
     const next = by > 0 ? places.find((from) => from > at) : places.findLast((from) => from < at);
     if (next !== undefined) this.seek(next);
   }

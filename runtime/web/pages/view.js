@@ -1,6 +1,6 @@
 // The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
-import { counted, State } from "./state.js";
+import { State } from "./state.js";
 import { chip, typeStyles } from "./types.js";
 import { $, fillTable, list, make, say, tell } from "./wire.js";
 
@@ -135,7 +135,8 @@ export class View {
     if (this.switches.length) {
       const names = this.switches.filter((_, bit) => closed[bit]);
       const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
-      const said = counted(names.length, this.switches.length, gone.filter(Boolean).length, "switches closed");
+      const lacking = gone.filter(Boolean).length, readable = lacking ? "readable " : "", besides = lacking ? `; ${lacking} lost` : "";
+      const said = `${names.length} of ${this.switches.length - lacking} ${readable}switches closed${besides}`;
       say($("hand-says"), `${said}${names.length ? ": " : ""}${names.slice(0, SHOWN).join(", ")}${more}`);
     }
     this.drawing.setClosed(closed, gone);
