@@ -198,5 +198,5 @@ function detail(point, of) {
 }
 
 for (const what of ["add", "drop", "measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));
-for (const what of ["curve", "cancel"]) $(what).addEventListener("click", () => ask(what));
+$("curve").addEventListener("click", () => ask("curve"));
 $("clear").addEventListener("click", () => choose([]));

@@ -69,7 +69,7 @@ const ask = openPage({
   set: ({ why, sensors: all }) => {
     sensors = all.length;
     $("train").disabled = Boolean(why);
-    if (why) say($("work"), why);
+    say($("lacking"), why ?? "");
   },
   train: trained,
   station: ({ why }) => {

@@ -1,6 +1,7 @@
-// The frame of every page: the bar on top, the links to the other pages, the connection to the server, and its work.
+// The frame of every page: the bar on top, the links to the other pages, the connection to the server, its work, and
+// what it refuses.
 import { clock } from "./state.js";
-import { $, connect, make, say, tell } from "./wire.js";
+import { $, button, connect, make, say, tell } from "./wire.js";
 
 /** What the server does, in words. */
 export const WORK = {
@@ -19,40 +20,31 @@ export function openPage(handlers) {
   const title = make("h1", {}, make("span", { class: "brand" }, "thenar"), " ", make("span", { id: "name" }));
   const pages = make("nav", { id: "pages", "aria-label": "Pages" });
   document.head.append(make("link", { rel: "icon", href: "icon.svg" }));
-  document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages));
+  const cancel = button("Cancel", () => send({ do: "cancel" }), { id: "cancel", class: "plain", hidden: true });
+  const busy = make("p", { class: "row" }, make("span", { id: "work", role: "status" }), cancel);
+  const refused = make("p", { id: "refused", role: "alert" });
+  document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages, busy, refused));
   link(false, "connecting");
   const send = connect({
-    ...handlers,
-    ...($("work") ? { work } : {}),
-    open: () => {
-      link(true, `connected since ${clock(performance.now())}`);
-      handlers.open?.();
-    },
+    work,
+    shell: show,
+    open: () => link(true, `connected since ${clock(performance.now())}`),
     closed: () => {
       link(false, `not connected since ${clock(performance.now())}`);
       clearTimeout(lasts);
       glove("warn", $("glove-state").hidden ? "" : "not known");
-      handlers.closed?.();
     },
-    shell: (message) => {
-      show(message);
-      handlers.shell?.(message);
-    },
-    glove: (message) => {
+    glove: ({ is, words, lasts_s: until }) => {
       const since = clock(performance.now());
       clearTimeout(lasts);
-      if (message.lasts_s) lasts = setTimeout(() => glove("bad", `silent since ${since}`), 1000 * message.lasts_s);
-      glove(message.is, message.words);
-      handlers.glove?.(message);
+      if (until) lasts = setTimeout(() => glove("bad", `silent since ${since}`), 1000 * until);
+      glove(is, words);
     },
-    refused: (message) => {
-      if ($("refused")) say($("refused"), message.why);
-      handlers.refused?.(message);
-    },
-  });
+    refused: ({ why }) => say(refused, why),
+  }, handlers);
   return (what, more = {}) => {
     const sent = send({ do: what, ...more });
-    if ($("refused")) say($("refused"), sent ? "" : "not connected");
+    say(refused, sent ? "" : "not connected");
     return sent;
   };
 }
@@ -83,7 +75,7 @@ let working = null; // what is done now, and when it will be finished
 
 function work({ done, total, what, why, left_s: left }) {
   working = done < total ? { what, share: done / total, end: left == null ? null : performance.now() + 1000 * left } : null;
-  if ($("cancel")) $("cancel").hidden = !working || what === "reading";
+  $("cancel").hidden = !working || what === "reading";
   if (working) countDown();
   else say($("work"), why ?? "");
 }

@@ -2,30 +2,31 @@
 
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
+const DARK = "(prefers-color-scheme: dark)";
 
 /**
  * Connect to the server of this page.
- * @param {Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection itself;
- * the server sends these topics
+ * @param {...Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection
+ * itself; the server sends these topics
  * @returns {function(object): boolean} send({do: ..., ...}), which returns false while there is no connection
  */
-export function connect(handlers) {
+export function connect(...handlers) {
   let socket = null;
   let wait = FIRST_MS;
 
+  const topics = new Set(handlers.flatMap(Object.keys));
+  const take = (message) => handlers.forEach((some) => some[message.topic]?.(message));
+
   function open() {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    socket = new WebSocket(`${scheme}//${location.host}/live?topics=${Object.keys(handlers)}`);
+    socket = new WebSocket(`${scheme}//${location.host}/live?topics=${[...topics]}`);
     socket.addEventListener("open", () => {
       wait = FIRST_MS;
-      handlers.open?.({});
+      take({ topic: "open" });
     });
-    socket.addEventListener("message", (event) => {
-      const message = JSON.parse(event.data);
-      handlers[message.topic]?.(message);
-    });
+    socket.addEventListener("message", (event) => take(JSON.parse(event.data)));
     socket.addEventListener("close", () => {
-      handlers.closed?.({});
+      take({ topic: "closed" });
       setTimeout(open, wait);
       wait = Math.min(2 * wait, LONGEST_MS);
     });
@@ -115,14 +116,15 @@ export function clearedPen(canvas) {
   return pen;
 }
 
-/** Return the page's colours by their names. */
+/** Return the page's colours by their names: of each its style has one for light pages and one for dark ones. */
 export function colours() {
-  const css = getComputedStyle(document.body), names = ["text", "soft", "page", "line", "warn", "bad"];
-  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).trim()]));
+  const css = getComputedStyle(document.body), at = matchMedia(DARK).matches ? 1 : 0;
+  const names = ["text", "soft", "page", "line", "warn", "bad"];
+  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).match(/#\w+/g)[at]]));
 }
 
 /** Let a canvas be drawn anew when its size or the page's colours change. */
 export function redraw(canvas, paint) {
   new ResizeObserver(paint).observe(canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", paint);
+  matchMedia(DARK).addEventListener("change", paint);
 }
