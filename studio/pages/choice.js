@@ -1,4 +1,7 @@
-// The sensors that are in use, on all pages of the studio in this tab; a reload and a restart of the server keep them.
+// What pages of the studio share: the sensors that are in use, boxes, keys, and what was trained.
+import { $, box, button, make } from "./wire.js";
+
+// The sensors are those of all pages in this tab; a reload and a restart of the server keep them.
 const KEY = "thenar.sensors";
 
 /** Return the numbers of the chosen sensors; none if they were chosen among other sensors than these. */
@@ -21,11 +24,39 @@ export function percent(share) {
   return (100 * share).toFixed(1);
 }
 
-/** Return a button with this text. */
-export function button(text, press) {
-  const made = document.createElement("button");
-  made.type = "button";
-  made.textContent = text;
-  made.addEventListener("click", press);
-  return made;
+/**
+ * List members {id, text, checked} as boxes, whose values are the ids. Boxes that stay keep the focus and what a user
+ * ticked.
+ */
+export function listBoxes(element, members, changed) {
+  const before = new Map([...element.children].map((label) => [`${label.control.value} ${label.textContent}`, label]));
+  const labels = members.map(({ id, text, checked }) => before.get(`${id} ${text}`) ?? box(text, changed, { value: id, checked }));
+  if (labels.length !== before.size || labels.some((label, at) => label !== element.children[at])) element.replaceChildren(...labels);
+}
+
+/** Return the ids of the members whose boxes are ticked. */
+export const ticked = (element) => [...element.querySelectorAll(":checked")].map(({ value }) => value);
+
+/**
+ * Show the keys that count now as buttons, the usual one first, with their letters if they have some.
+ * @returns {?HTMLButtonElement} the first one, or null if the keys are those of before
+ */
+export function showKeys(keys, press, letters = {}) {
+  const words = Object.entries(keys), said = words.map(String).join();
+  if (said === ($("keys").dataset.keys ?? "")) return null;
+  $("keys").dataset.keys = said;
+  const buttons = words.map(([key, what], at) => {
+    const made = button(what, () => press(key), { class: at ? "plain" : "", "data-key": key });
+    if (letters[key]) made.append(make("kbd", {}, letters[key]));
+    return made;
+  });
+  $("keys").replaceChildren(...buttons);
+  return buttons[0] ?? null;
+}
+
+/** Show what was trained. */
+export function trained({ folder, facts }) {
+  const items = facts.map((fact) => make("li", {}, fact)), id = "build-heading";
+  $("build").hidden = false;
+  $("build").replaceChildren(make("h3", { id }, `Trained: ${folder}`), make("ul", { id: "facts", "aria-labelledby": id }, ...items));
 }

@@ -1,26 +1,26 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { button, interval, percent, storeChoice, storedChoice } from "./choice.js";
-import { drawHand } from "./hand.js";
-import { openPage } from "./shell.js";
-import { cell, list, say } from "./wire.js";
+import { interval, listBoxes, percent, storeChoice, storedChoice, trained } from "./choice.js";
+import { draw, drawHand, pressable } from "./hand.js";
+import { duration, openPage, WORK } from "./shell.js";
+import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
 const KINDS = { switch: "Switches", pad: "Pads", joint: "Joints" };
-const WORK = { reading: "reading", measure: "measuring", curve: "measuring the curve", train: "training" };
 
 let set = null; // the message on the set
 let hand = null;
 let boxes = [];
 let chosen = []; // numbers of sensors, in the order in which they were chosen
 let shown = null; // the last reply
-let working = null; // what is done now, and when it will be finished
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
   open: () => set && !set.why && choose(chosen),
   project: ({ sets, state: { aside, took } }) => {
-    listSets(sets, aside);
-    const known = Object.keys(WORK).filter((what) => took[what] !== undefined);
+    listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name })), ({ target }) => {
+      ask("use", { id: target.value, value: Number(target.checked) });
+    });
+    sets.forEach(({ name }, at) => ($("sets").children[at].control.checked = !aside.includes(name)));
+    const known = ["reading", "measure", "curve", "train"].filter((what) => took[what] !== undefined);
     say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");
   },
   set: (message) => {
@@ -30,8 +30,7 @@ const ask = openPage({
       $("curve-panel").hidden = true;
     }
     set = message;
-    $("empty").hidden = !set.why;
-    say($("empty"), set.why);
+    tell("empty", set.why);
     list($("unused"), set.unused ?? []);
     $("with-set").hidden = Boolean(set.why);
     if (set.why) return;
@@ -58,50 +57,8 @@ const ask = openPage({
     certify();
   },
   curve: (curve) => curve.numbering === set.numbering && drawCurve(curve),
-  train: ({ folder, facts }) => {
-    $("build").hidden = false;
-    say($("build-heading"), `Trained: ${folder}`);
-    list($("facts"), facts);
-  },
-  work: ({ done, total, what, why, left_s: left }) => {
-    working = done < total ? { what, share: done / total, end: left == null ? null : performance.now() + 1000 * left } : null;
-    $("cancel").hidden = !working || what === "reading";
-    countDown(why ?? "");
-  },
+  train: trained,
 });
-
-/** Say how far the work is, and how long it takes still. */
-function countDown(why = "") {
-  if (!working) {
-    say($("work"), why);
-    return;
-  }
-  const { what, share, end } = working, left = end === null ? null : (end - performance.now()) / 1000;
-  const time = left === null ? "" : left > 1 ? `, about ${duration(left)} left` : ", any moment now";
-  say($("work"), `${WORK[what] ?? what}: ${Math.round(100 * share)} %${time}`);
-}
-
-setInterval(() => working && countDown(), 1000);
-
-function duration(seconds) {
-  if (seconds < 10) return `${Math.max(1, Math.round(seconds))} s`;
-  return seconds < 100 ? `${5 * Math.round(seconds / 5)} s` : `${Math.round(seconds / 60)} min`;
-}
-
-function listSets(sets, aside) {
-  const rows = sets.map(({ id, name }) => {
-    const label = document.createElement("label"), box = document.createElement("input");
-    box.type = "checkbox";
-    box.checked = !aside.includes(name);
-    box.addEventListener("change", () => ask("use", { id, value: Number(box.checked) }));
-    label.append(box, name);
-    return label;
-  });
-  // A box that stays keeps the focus.
-  const same = String(rows.map((row) => row.textContent)) === String([...$("sets").children].map((row) => row.textContent));
-  if (same) rows.forEach((row, place) => ($("sets").children[place].firstChild.checked = row.firstChild.checked));
-  else $("sets").replaceChildren(...rows);
-}
 
 // A reply to an earlier choice comes too late.
 const isChosen = (sensors) => String(sensors) === String(chosen);
@@ -129,20 +86,14 @@ function mark() {
 function listSensors() {
   boxes = [];
   const groups = Object.entries(KINDS).map(([kind, title]) => {
-    const group = document.createElement("fieldset"), legend = document.createElement("legend");
-    const inside = document.createElement("div");
-    legend.textContent = title;
-    group.append(legend, inside);
+    const inside = make("div");
     set.sensors.forEach(({ name, kind: own, price }, sensor) => {
       if (own !== kind) return;
-      const label = document.createElement("label"), box = document.createElement("input");
-      box.type = "checkbox";
-      box.addEventListener("change", () => toggle(sensor));
-      label.append(box, price === null ? name : `${name}, ${price.toFixed(2)}`);
+      const label = box(price === null ? name : `${name}, ${price.toFixed(2)}`, () => toggle(sensor));
       inside.append(label);
-      boxes[sensor] = box;
+      boxes[sensor] = label.control;
     });
-    return inside.children.length ? group : null;
+    return inside.children.length ? make("fieldset", {}, make("legend", {}, title), inside) : null;
   });
   $("list").replaceChildren(...groups.filter(Boolean));
 }
@@ -192,73 +143,58 @@ function certify() {
 
 function drawCurve({ points, of, enough }) {
   $("curve-panel").hidden = false;
-  say($("curve-of"), `${of}, %`);
-  const rows = points.map((point) => {
-    const row = document.createElement("tr"), last = cell("td", ""), number = point.sensors.length;
-    if (number === enough) row.setAttribute("aria-current", "true");
-    last.append(button(`Choose these ${number}`, () => choose(point.sensors)));
-    row.append(
-      cell("th", number === enough ? `${number}: more matter little` : String(number)),
-      cell("td", `${percent(point.mean)} [${percent(point.low)}, ${percent(point.high)}]`),
-      cell("td", point.worth || "–"),
-      cell("td", point.adapted === null ? "–" : percent(point.adapted)),
-      last,
-    );
-    return row;
-  });
-  $("points").replaceChildren(...rows);
+  const titles = ["Sensors", `${of}, %`, "Worth of the last, points", "After 2 own trials, %", ""];
+  fillTable("points", titles, points.map((point) => {
+    const number = point.sensors.length;
+    return [
+      number === enough ? `${number}: more matter little` : number,
+      `${percent(point.mean)} [${percent(point.low)}, ${percent(point.high)}]`,
+      point.worth || "–",
+      point.adapted === null ? "–" : percent(point.adapted),
+      button(`Choose these ${number}`, () => choose(point.sensors)),
+    ];
+  }));
+  $("points").children[points.findIndex(({ sensors }) => sensors.length === enough)]?.setAttribute("aria-current", "true");
   drawFront(points, of);
   detail(points.find(({ sensors }) => sensors.length === enough), of);
 }
 
-const SVG = "http://www.w3.org/2000/svg";
 const BOX = { left: 46, right: 470, top: 10, bottom: 262 };
-
-function element(name, attributes, parent, text = "") {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.textContent = text;
-  parent.append(made);
-  return made;
-}
 
 function drawFront(points, of) {
   const svg = $("front"), most = Math.max(...points.map(({ sensors }) => sensors.length));
   const x = (number) => BOX.left + (number / (most + 0.5)) * (BOX.right - BOX.left);
   const y = (share) => BOX.bottom - share * (BOX.bottom - BOX.top);
-  svg.replaceChildren();
-  for (const share of [0, 0.25, 0.5, 0.75, 1]) {
-    element("path", { class: "grid", d: `M${BOX.left} ${y(share)}H${BOX.right}` }, svg);
-    element("text", { x: BOX.left - 6, y: y(share) + 4, "text-anchor": "end" }, svg, `${100 * share} %`);
-  }
+  const words = (left, top, text, anchor = "middle") => draw("text", { x: left, y: top, "text-anchor": anchor }, text);
+  const parts = [0, 0.25, 0.5, 0.75, 1].flatMap((share) => [
+    draw("path", { class: "grid", d: `M${BOX.left} ${y(share)}H${BOX.right}` }),
+    words(BOX.left - 6, y(share) + 4, `${100 * share} %`, "end"),
+  ]);
   const step = Math.ceil(most / 8);
-  for (let number = step; number <= most; number += step) {
-    element("text", { x: x(number), y: BOX.bottom + 16, "text-anchor": "middle" }, svg, number);
-  }
-  element("text", { x: (BOX.left + BOX.right) / 2, y: BOX.bottom + 33, "text-anchor": "middle" }, svg, "number of sensors");
+  for (let number = step; number <= most; number += step) parts.push(words(x(number), BOX.bottom + 16, number));
+  parts.push(words((BOX.left + BOX.right) / 2, BOX.bottom + 33, "number of sensors"));
   const line = points.map(({ sensors, mean }) => `${x(sensors.length)} ${y(mean)}`).join("L");
-  element("path", { class: "front", d: `M${line}` }, svg);
+  parts.push(draw("path", { class: "front", d: `M${line}` }));
+  svg.replaceChildren(...parts);
   for (const point of points) {
-    const number = point.sensors.length, spot = element("g", { class: "point", role: "button", tabindex: 0 }, svg);
-    spot.setAttribute("aria-label", `${number} sensors: ${interval(point)}`);
-    element("path", { d: `M${x(number)} ${y(point.low)}V${y(point.high)}` }, spot);
-    element("circle", { cx: x(number), cy: y(point.mean), r: 5 }, spot);
-    element("rect", { x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }, spot);
-    spot.addEventListener("click", () => detail(point, of));
-    spot.addEventListener("keydown", (event) => {
-      if (event.key !== "Enter" && event.key !== " ") return;
-      event.preventDefault();
-      detail(point, of);
-    });
+    const number = point.sensors.length;
+    const spot = draw(
+      "g",
+      { class: "point" },
+      draw("path", { d: `M${x(number)} ${y(point.low)}V${y(point.high)}` }),
+      draw("circle", { cx: x(number), cy: y(point.mean), r: 5 }),
+      draw("rect", { x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
+    );
+    svg.append(pressable(spot, `${number} sensors: ${interval(point)}`, () => detail(point, of)));
   }
 }
 
 /** Show what a point of the front is. */
 function detail(point, of) {
   const number = point.sensors.length;
-  [...$("front").querySelectorAll(".point")].forEach((spot) => {
-    spot.setAttribute("aria-pressed", String(spot.getAttribute("aria-label").startsWith(`${number} sensors`)));
-  });
+  for (const spot of $("front").querySelectorAll(".point")) {
+    spot.setAttribute("aria-pressed", spot.getAttribute("aria-label").startsWith(`${number} sensors`));
+  }
   say($("point-heading"), `${number} ${number === 1 ? "sensor" : "sensors"}: ${interval(point)}, ${of}`);
   say($("point-about"), point.worth && `the last one is worth ${point.worth} points`);
   say($("point-sensors"), point.sensors.map((sensor) => set.sensors[sensor].name).join(", "));
@@ -266,10 +202,6 @@ function detail(point, of) {
   $("point-choose").onclick = () => choose(point.sensors);
 }
 
-$("add").addEventListener("click", () => ask("add", { sensors: chosen }));
-$("drop").addEventListener("click", () => ask("drop", { sensors: chosen }));
-$("clear").addEventListener("click", () => choose([]));
-$("measure").addEventListener("click", () => ask("measure", { sensors: chosen }));
-$("train").addEventListener("click", () => ask("train", { sensors: chosen }));
+for (const what of ["add", "drop", "measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));
 $("curve").addEventListener("click", () => ask("curve"));
-$("cancel").addEventListener("click", () => ask("cancel"));
+$("clear").addEventListener("click", () => choose([]));

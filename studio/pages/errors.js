@@ -1,15 +1,13 @@
 // The page Errors: which trials are misread, in a matrix and on a map; the selected ones as small hands; and their edits.
-import { button, interval, storedChoice } from "./choice.js";
-import { drawHand } from "./hand.js";
+import { interval, storedChoice } from "./choice.js";
+import { draw, drawHand } from "./hand.js";
 import { TrialMap } from "./map.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { cell, list, say } from "./wire.js";
+import { $, box, button, fillMenu, fillTable, list, make, say, tell } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
 const percent = (share) => `${Math.round(100 * share)} %`;
 const STEP = 24; // the number of trials that are shown at a time
-const SVG = "http://www.w3.org/2000/svg";
 
 let set = null; // the message on the set
 let drawn = null; // the message on the hand
@@ -32,12 +30,11 @@ const ask = openPage({
     // Where a trial was left out, the next one has its number.
     last -= 1;
     set = message;
-    $("empty").hidden = !set.why;
+    tell("empty", set.why);
     $("with-set").hidden = Boolean(set.why);
-    say($("empty"), set.why);
     if (set.why) return;
     list($("unused"), set.unused);
-    $("type").replaceChildren(...set.types.map((name) => new Option(name)));
+    fillMenu($("type"), set.types.map((name) => ({ id: name, name })));
     select([]);
     look();
   },
@@ -101,12 +98,8 @@ function show(message) {
   const looks = reply.truth.map((truth, trial) => ({ colour: styles.get(type(truth)).colour ?? "#8a8a8a", wrong: misread(trial) }));
   const labels = trials.flatMap((those, kind) => (those.length ? [{ code: styles.get(type(kind)).code, trials: those }] : []));
   map.show(reply.places, looks, labels);
-  const entries = reply.types.filter((_, kind) => trials[kind].length).map((name) => {
-    const entry = document.createElement("li");
-    entry.append(tag(styles, name));
-    return entry;
-  });
-  $("legend").replaceChildren(...entries);
+  const there = reply.types.filter((_, kind) => trials[kind].length);
+  $("legend").replaceChildren(...there.map((name) => make("li", {}, tag(styles, name))));
   // A link of the page Compare names a trial and its type.
   const linked = decodeURIComponent(location.hash.slice(1));
   if (linked) {
@@ -119,43 +112,24 @@ function show(message) {
 /* ---- The matrix: its numbers and the names of its rows select trials ---- */
 
 function matrix(trials) {
-  const head = document.createElement("tr"), body = document.createElement("tbody");
-  head.append(document.createElement("td"), ...reply.types.map((name) => column(name)));
-  body.append(head);
-  trials.forEach((those, truth) => {
-    if (!those.length) return;
-    const row = document.createElement("tr"), title = cell("th", ""), name = type(truth);
-    const wrong = those.filter(misread), made = button(name, () => select(wrong));
-    made.className = "plain";
-    made.disabled = !wrong.length;
-    made.setAttribute("aria-label", `${name}: select its ${wrong.length} errors`);
-    made.replaceChildren(tag(styles, name));
-    title.append(made);
-    row.append(title);
-    reply.types.forEach((other, read) => {
-      const some = those.filter((trial) => reply.read[trial] === read), place = cell("td", "");
-      if (some.length) {
-        const number = button(some.length, () => select(some));
-        number.className = "plain";
-        number.setAttribute("aria-label", `${some.length} trials of ${name} recognised as ${other}`);
-        place.dataset.is = truth === read ? "good" : "bad";
-        place.append(number);
-      }
-      row.append(place);
-    });
-    body.append(row);
+  const heads = reply.types.map((name) => {
+    const label = tag(styles, name);
+    label.lastChild.className = "unseen";
+    label.title = name;
+    return label;
   });
-  $("confusion").replaceChildren(body);
-}
-
-function column(name) {
-  const made = cell("th", "");
-  made.scope = "col";
-  made.title = name;
-  const label = tag(styles, name);
-  label.lastChild.className = "unseen";
-  made.append(label);
-  return made;
+  const numbers = (some, label, kind) => button(some.length, () => select(some), { class: "plain", "aria-label": label, "data-is": kind });
+  fillTable("confusion", ["", ...heads], trials.flatMap((those, truth) => {
+    if (!those.length) return [];
+    const name = type(truth), wrong = those.filter(misread), title = numbers(wrong, `${name}: select its ${wrong.length} errors`, "");
+    title.disabled = !wrong.length;
+    title.replaceChildren(tag(styles, name));
+    const cells = reply.types.map((other, read) => {
+      const some = those.filter((trial) => reply.read[trial] === read), label = `${some.length} trials of ${name} recognised as ${other}`;
+      return some.length ? numbers(some, label, truth === read ? "good" : "bad") : "";
+    });
+    return [[title, ...cells]];
+  }));
 }
 
 /* ---- The selected trials ---- */
@@ -197,11 +171,9 @@ function mark() {
   say($("relabel"), `Relabel ${count}`);
   say($("drop"), `Leave out ${count}`);
   const pair = pairOf(selected);
-  $("more").hidden = pair.length !== 2;
-  if (pair.length !== 2) return;
   const query = new URLSearchParams([...pair.map((kind) => ["type", type(kind)]), ["repetitions", 5]]);
   $("more").href = `record.html?${query}`;
-  say($("more"), `Record five more of ${pair.map(type).join(" and ")}`);
+  tell("more", pair.length === 2 && `Record five more of ${pair.map(type).join(" and ")}`);
 }
 
 /** Return the true and the recognised type, if all these trials have the same two. */
@@ -213,39 +185,34 @@ function pairOf(trials) {
 function showTrials({ trials, typical }) {
   const first = !$("trials").children.length, cards = trials.map((one) => card(one, typical));
   const usual = pairOf(selected).map(type).filter((name) => first && typical[name]).map((name) => {
-    const figure = document.createElement("figure"), caption = document.createElement("figcaption");
-    caption.append(tag(styles, name), ", typically");
-    figure.append(caption, ...hand(typical[name], [], `${name}, typically`));
-    return figure;
+    return make("figure", { class: "boxed" }, make("figcaption", {}, tag(styles, name), ", typically"), ...hand(typical[name], [], `${name}, typically`));
   });
   $("trials").append(...(cards.length === 1 ? [...cards, ...usual] : [...usual, ...cards]));
 }
 
 function card({ trial, shown, decisive }, typical) {
-  const made = document.createElement("article"), label = document.createElement("label"), box = document.createElement("input");
-  const [truth, read] = [type(reply.truth[trial]), type(reply.read[trial])], verdict = document.createElement("p");
-  Object.assign(box, { type: "checkbox", checked: true, value: trial });
-  box.addEventListener("change", mark);
-  label.append(box, set.trials[trial]);
-  verdict.dataset.is = truth === read ? "good" : "bad";
-  verdict.append(tag(styles, truth), " recognised as ", tag(styles, read));
-  const inputs = document.createElement("ul");
-  list(inputs, decisive.map((sensor) => {
+  const [truth, read] = [type(reply.truth[trial]), type(reply.read[trial])], words = set.trials[trial];
+  const inputs = decisive.map((sensor) => {
     const usual = [truth, read].filter((name) => typical[name]).map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");
-    return `${set.sensors[sensor].name} ${percent(shown[sensor])} (${usual})`;
-  }));
-  made.append(label, verdict, ...hand(shown, decisive, set.trials[trial]), ...(decisive.length ? ["Decided by", inputs] : []));
-  return made;
+    return make("li", {}, `${set.sensors[sensor].name} ${percent(shown[sensor])} (${usual})`);
+  });
+  return make(
+    "article",
+    { class: "boxed" },
+    box(words, mark, { checked: true, value: trial }),
+    make("p", { "data-is": truth === read ? "good" : "bad" }, tag(styles, truth), " recognised as ", tag(styles, read)),
+    ...hand(shown, decisive, words),
+    ...(inputs.length ? ["Decided by", make("ul", {}, ...inputs)] : []),
+  );
 }
 
 /** Return a picture of what sensors showed: those in use that were closed for more than half of the time, and joints. */
 function hand(shown, decisive, words) {
-  const svg = document.createElementNS(SVG, "svg"), used = new Set(reply.sensors), first = set.sensors.length - set.joints.length;
+  const used = new Set(reply.sensors), first = set.sensors.length - set.joints.length;
   const joints = set.joints.filter(({ joint }) => used.has(first + joint));
   const switches = drawn.switches.filter(({ bit }) => used.has(bit));
   if (!switches.length && !joints.length) return [];
-  svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", `hand: ${words}`);
+  const svg = draw("svg", { role: "img", "aria-label": `hand: ${words}` });
   // Drawn when it is nearly on the screen: before, it has no width, and thousands would take long.
   watcher.observe(svg);
   waiting.set(svg, () => {

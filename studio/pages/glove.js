@@ -1,12 +1,10 @@
 // The page Glove: a glove is connected, watched and calibrated.
-import { drawHand } from "./hand.js";
-import { showKeys } from "./keys.js";
+import { draw, drawHand } from "./hand.js";
+import { showKeys } from "./choice.js";
 import { openPage } from "./shell.js";
 import { clock } from "./state.js";
-import { cell, list, say } from "./wire.js";
+import { $, button, fillTable, list, make, say } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
-const SVG = "http://www.w3.org/2000/svg";
 const PAST_S = 30, ASK_MS = 500, OLD_MS = 1000;
 const KINDS = { joint: "joints", pad: "pads" };
 
@@ -59,32 +57,13 @@ function showGlove(message) {
   spots = about.names.map((name) => drawn.get(name) ?? null);
   // A spot says its state, and is no switch to turn on.
   for (const spot of drawn.values()) spot.removeAttribute("aria-pressed");
-  buttons = about.names.map((name, sensor) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "plain";
-    button.textContent = name;
-    button.addEventListener("click", () => choose(sensor));
-    return button;
-  });
-  $("sensors").replaceChildren(
-    ...buttons.map((button) => {
-      const item = document.createElement("li");
-      item.append(button);
-      return item;
-    }),
-  );
+  buttons = about.names.map((name, sensor) => button(name, () => choose(sensor), { class: "plain" }));
+  $("sensors").replaceChildren(...buttons.map((one) => make("li", {}, one)));
   const kinds = Object.keys(KINDS).filter((kind) => about.kinds.includes(kind));
-  $("calibrate").replaceChildren(
-    ...kinds.map((kind) => {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.className = "plain";
-      button.textContent = `Calibrate the ${KINDS[kind]}${about.lacks.includes(kind) ? "" : " anew"}`;
-      button.addEventListener("click", () => ask("calibrate", { name: kind }));
-      return button;
-    }),
-  );
+  $("calibrate").replaceChildren(...kinds.map((kind) => {
+    const words = `Calibrate the ${KINDS[kind]}${about.lacks.includes(kind) ? "" : " anew"}`;
+    return button(words, () => ask("calibrate", { name: kind }), { class: "plain" });
+  }));
   states = [];
   choose(null);
   watchOnce();
@@ -94,17 +73,12 @@ function showFound({ port, busy, columns, rows, remarks, text, wrong }) {
   $("found").hidden = false;
   say($("found-heading"), busy ? `Listening to ${port}: press every switch and pad, bend every finger` : `${rows} rows came from ${port}`);
   $("connect").hidden = $("proposal").hidden = busy || wrong.length > 0;
-  $("columns-scroll").hidden = busy || !columns.length;
+  $("columns-table").hidden = busy || !columns.length;
   list($("remarks"), busy ? [] : [...wrong, ...remarks]);
   if (busy) return;
   say($("proposal"), text);
-  $("columns").replaceChildren(
-    ...columns.map(({ column, least, greatest, taken_for }) => {
-      const row = document.createElement("tr");
-      row.append(cell("th", column), ...[least, greatest, taken_for].map((one) => cell("td", one === null ? "" : String(one))));
-      return row;
-    }),
-  );
+  const sent = columns.map(({ column, least, greatest, taken_for }) => [column, least ?? "", greatest ?? "", taken_for ?? ""]);
+  fillTable("columns", ["Column", "Least", "Greatest", "Taken for"], sent);
 }
 
 function showState(message) {
@@ -119,7 +93,7 @@ function showState(message) {
   message.states.forEach((state, sensor) => {
     if (state === states[sensor]) return;
     const words = `${about.names[sensor]}: ${state}`;
-    for (const element of [spots[sensor], buttons[sensor]].filter(Boolean)) element.dataset.state = state;
+    for (const one of [spots[sensor], buttons[sensor]].filter(Boolean)) one.dataset.state = state;
     spots[sensor]?.setAttribute("aria-label", words);
     say(buttons[sensor], words);
   });
@@ -135,15 +109,9 @@ function showState(message) {
     connected ? error || "connected" : `lost: ${error}`,
     counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
   ]);
-  if (JSON.stringify(rows) === $("devices").dataset.rows) return;
-  $("devices").dataset.rows = JSON.stringify(rows);
-  $("devices").replaceChildren(
-    ...rows.map(([name, ...rest]) => {
-      const row = document.createElement("tr");
-      row.append(cell("th", name), ...rest.map((one) => cell("td", one)));
-      return row;
-    }),
-  );
+  if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
+  $("devices-table").dataset.rows = JSON.stringify(rows);
+  fillTable("devices", ["Device", "State", "Counted"], rows);
 }
 
 /** Grey what was seen before: nothing watches now. */
@@ -156,7 +124,7 @@ function stale() {
 
 function choose(sensor) {
   chosen = sensor;
-  buttons.forEach((button, at) => button.setAttribute("aria-pressed", String(at === sensor)));
+  buttons.forEach((one, at) => one.setAttribute("aria-pressed", at === sensor));
   $("one").hidden = sensor === null;
   if (sensor === null) return;
   say($("one-heading"), `${about.names[sensor]}, ${about.kinds[sensor]}`);
@@ -179,7 +147,7 @@ function plot({ sensor, past, changes }) {
     const joined = at && past[at - 1][1] !== null ? "L" : "M";
     return value === null ? "" : `${joined}${x(ago)} ${y(value)}H${x(until)}`;
   });
-  const line = $("plot").firstElementChild ?? $("plot").appendChild(document.createElementNS(SVG, "path"));
+  const line = $("plot").firstElementChild ?? $("plot").appendChild(draw("path"));
   line.setAttribute("d", steps.join(""));
   const now = past.at(-1)?.[1];
   const shown = now === null || now === undefined ? "not read" : about.kinds[sensor] === "switch" ? ["open", "closed"][now] : now;
@@ -204,7 +172,7 @@ function showStep({ step, what, problems, faults, keys }) {
   say($("what"), what);
   list($("problems"), problems);
   list($("faults"), faults);
-  showKeys($("keys"), keys, (key) => ask("step", { name: key }))?.focus();
+  showKeys(keys, (name) => ask("step", { name }))?.focus();
 }
 
 $("form").addEventListener("submit", (event) => {

@@ -1,7 +1,6 @@
 // How the grasp types of the published taxonomies look: a posture of the hand, and the shape of the object in it.
-import { drawHand } from "./hand.js";
+import { draw, drawHand } from "./hand.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const FINGERS = ["index", "middle", "ring", "little"];
 
 // Of every finger mcp, pip and dip in degrees, or of all alike; of the thumb abduction, rotation, mcp and ip.
@@ -87,25 +86,18 @@ export function drawGrasp(svg, name) {
 }
 
 function drawnObject(shape, x, y, long, thick, turn) {
-  const group = document.createElementNS(SVG, "g");
-  group.setAttribute("class", "object");
-  group.setAttribute("transform", `translate(${x} ${y}) rotate(${turn})`);
-  const part = (name, attributes) => {
-    const made = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-    group.append(made);
-    return made;
-  };
-  const [half, r] = [long / 2, thick / 2];
-  if (shape === "sphere") part("circle", { r: half });
-  else if (shape === "flat") part("rect", { x: -half, y: -r, width: long, height: thick, rx: 1.5 });
-  else if (shape === "disc") {
-    part("path", { d: `M${-half} 0V${thick}A${half} ${half / 3} 0 0 0 ${half} ${thick}V0Z` });
-    part("ellipse", { rx: half, ry: half / 3, class: "top" });
-  } else {
+  const [half, r] = [long / 2, thick / 2], parts = {
+    sphere: () => [draw("circle", { r: half })],
+    flat: () => [draw("rect", { x: -half, y: -r, width: long, height: thick, rx: 1.5 })],
+    disc: () => [
+      draw("path", { d: `M${-half} 0V${thick}A${half} ${half / 3} 0 0 0 ${half} ${thick}V0Z` }),
+      draw("ellipse", { rx: half, ry: half / 3, class: "top" }),
+    ],
     // Its end at the thumb is seen.
-    part("path", { d: `M${-half} ${-r}H${half}A${r / 2} ${r} 0 0 1 ${half} ${r}H${-half}A${r / 2} ${r} 0 0 1 ${-half} ${-r}Z` });
-    part("ellipse", { cx: half, rx: r / 2, ry: r, class: "top" });
-  }
-  return group;
+    cylinder: () => [
+      draw("path", { d: `M${-half} ${-r}H${half}A${r / 2} ${r} 0 0 1 ${half} ${r}H${-half}A${r / 2} ${r} 0 0 1 ${-half} ${-r}Z` }),
+      draw("ellipse", { cx: half, rx: r / 2, ry: r, class: "top" }),
+    ],
+  };
+  return draw("g", { class: "object", transform: `translate(${x} ${y}) rotate(${turn})` }, ...parts[shape]());
 }

@@ -1,4 +1,5 @@
 // The map of trials: thousands of marks on a canvas, to hover over, click, or draw a line around.
+import { clearedPen, colours, redraw } from "./wire.js";
 
 const MARGIN = 14, REACH = 12; // pixels
 const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
@@ -12,6 +13,7 @@ export class TrialMap {
   #pointed = -1;
   #line = null; // the lasso while it is drawn
   #touch = false;
+  #closed = false; // whether the click to come ends a lasso
 
   /** on: { point(trial or -1), select(trials) } */
   constructor(canvas, on) {
@@ -39,11 +41,8 @@ export class TrialMap {
       this.#closed = false;
     });
     canvas.addEventListener("keydown", (event) => this.#press(event));
-    new ResizeObserver(() => this.#draw()).observe(canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#draw());
+    redraw(canvas, () => this.#draw());
   }
-
-  #closed = false; // whether the click to come ends a lasso
 
   /** Let a finger draw the lasso instead of scrolling. */
   set touch(on) {
@@ -73,31 +72,23 @@ export class TrialMap {
   }
 
   #draw() {
-    const canvas = this.#canvas, pen = canvas.getContext("2d"), colours = getComputedStyle(canvas);
-    const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
-    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
-    pen.clearRect(0, 0, wide, high);
-    const [text, page, bad, soft] = ["--text", "--page", "--bad", "--soft"].map((name) => colours.getPropertyValue(name));
-    const circle = (x, y, radius) => {
+    const pen = clearedPen(this.#canvas), { text, page, bad, soft } = colours();
+    const ring = (place, radius, colour, width) => {
       pen.beginPath();
-      pen.arc(x, y, radius, 0, 2 * Math.PI);
+      pen.arc(...place, radius, 0, 2 * Math.PI);
+      pen.strokeStyle = colour;
+      pen.lineWidth = width;
+      pen.stroke();
     };
     this.#trials.forEach((trial, number) => {
-      const [x, y] = this.#pixels(trial), chosen = this.#selected.has(number);
-      circle(x, y, 3.5);
+      const place = this.#pixels(trial);
       pen.fillStyle = trial.colour;
+      ring(place, 3.5, soft, 0.5);
       pen.fill();
-      pen.strokeStyle = soft;
-      pen.lineWidth = 0.5;
-      pen.stroke();
-      if (!trial.wrong && !chosen) return;
-      circle(x, y, chosen ? 8 : 5.5);
-      pen.strokeStyle = chosen ? text : bad;
-      pen.lineWidth = chosen ? 3 : 1.5;
-      pen.stroke();
+      if (this.#selected.has(number)) ring(place, 8, text, 3);
+      else if (trial.wrong) ring(place, 5.5, bad, 1.5);
     });
-    pen.font = `600 14px ${colours.fontFamily}`;
+    pen.font = "600 14px system-ui, sans-serif";
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     for (const label of this.#labels) {
@@ -108,26 +99,27 @@ export class TrialMap {
       pen.fillStyle = text;
       pen.fillText(label.code, x, y);
     }
-    pen.strokeStyle = text;
-    if (this.#pointed >= 0) {
-      pen.lineWidth = 2;
-      circle(...this.#pixels(this.#trials[this.#pointed]), 11);
-      pen.stroke();
-    }
+    if (this.#pointed >= 0) ring(this.#pixels(this.#trials[this.#pointed]), 11, text, 2);
     if (!this.#line) return;
+    pen.strokeStyle = text;
     pen.lineWidth = 1.5;
     pen.beginPath();
     for (const place of this.#line) pen.lineTo(...place);
     pen.stroke();
   }
 
-  #nearest([x, y]) {
-    let best = -1, least = REACH;
+  // The trial of the least cost, which its place and number have; -1 if none is below the limit.
+  #best(cost, limit) {
+    let best = -1;
     this.#trials.forEach((trial, number) => {
-      const [left, top] = this.#pixels(trial), far = Math.hypot(left - x, top - y);
-      if (far < least) [best, least] = [number, far];
+      const found = cost(this.#pixels(trial), number);
+      if (found < limit) [best, limit] = [number, found];
     });
     return best;
+  }
+
+  #nearest([x, y]) {
+    return this.#best(([left, top]) => Math.hypot(left - x, top - y), REACH);
   }
 
   #point(trial) {
@@ -162,12 +154,11 @@ export class TrialMap {
       return;
     }
     const from = this.#pixels(this.#trials[this.#pointed]);
-    let best = -1, least = Infinity;
-    this.#trials.forEach((trial, number) => {
-      const to = this.#pixels(trial), step = [to[0] - from[0], to[1] - from[1]];
-      const along = step[0] * ahead[0] + step[1] * ahead[1], aside = Math.abs(step[0] * ahead[1]) + Math.abs(step[1] * ahead[0]);
-      if (number !== this.#pointed && along > 0 && along + 2 * aside < least) [best, least] = [number, along + 2 * aside];
-    });
+    const best = this.#best((to, number) => {
+      const [right, down] = [to[0] - from[0], to[1] - from[1]], along = right * ahead[0] + down * ahead[1];
+      const aside = Math.abs(right * ahead[1]) + Math.abs(down * ahead[0]);
+      return number !== this.#pointed && along > 0 ? along + 2 * aside : Infinity;
+    }, Infinity);
     if (best >= 0) this.#point(best);
   }
 }

@@ -1,13 +1,11 @@
 // The page Record: a collection is begun, led key by key, and ends with a set.
+import { percent, showKeys, trained } from "./choice.js";
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
-import { showKeys } from "./keys.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { list, say } from "./wire.js";
+import { $, button, fillMenu, list, make, say } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
-const percent = (share) => (100 * share).toFixed(1);
 const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
 
 const query = new URLSearchParams(location.search);
@@ -34,20 +32,14 @@ const ask = openPage({
     $("start").disabled = !glove;
     say($("objects"), objects ? "Objects are those of objects.toml." : "");
     listed = objects;
-    const before = $("taxonomy").value;
-    $("taxonomy").replaceChildren(...taxonomies.map((name) => new Option(name === "own" && objects ? "own, of objects.toml" : name, name)));
-    $("taxonomy").value = taxonomies.includes(before) ? before : objects ? "own" : taxonomies[0];
+    const members = taxonomies.map((id) => ({ id, name: id === "own" && objects ? "own, of objects.toml" : id }));
+    fillMenu($("taxonomy"), members, objects ? "own" : taxonomies[0]);
     askTypes();
     $("unfinished").hidden = !unfinished.length;
-    const items = unfinished.map(({ id, name, subject, done, total }) => {
-      const item = document.createElement("li"), button = document.createElement("button");
-      button.type = "button";
-      button.textContent = `Continue ${name} of ${subject}: ${done} of ${total} trials are done`;
-      button.addEventListener("click", () => ask("continue", { id }));
-      item.append(button);
-      return item;
-    });
-    $("recordings").replaceChildren(...items);
+    $("recordings").replaceChildren(...unfinished.map(({ id, name, subject, done, total }) => {
+      const words = `Continue ${name} of ${subject}: ${done} of ${total} trials are done`;
+      return make("li", {}, button(words, () => ask("continue", { id })));
+    }));
   },
   closed: () => say($("standing"), "this page is not connected"),
   collecting: (state) => show(state),
@@ -81,22 +73,14 @@ const ask = openPage({
   set: ({ why, types, taxonomy, sensors: all }) => {
     sensors = all.length;
     $("train").disabled = Boolean(why);
-    if (why) say($("work"), why);
+    say($("lacking"), why ?? "");
     if (why || !only.length) return;
     // More of the same set.
     $("taxonomy").value = [...$("taxonomy").options].some(({ value }) => value === taxonomy) ? taxonomy : "own";
     $("types").value = types.join(", ");
     askTypes();
   },
-  work: ({ done, total, what, why }) => {
-    const busy = { reading: "reading", train: "training" }[what] ?? what;
-    say($("work"), why ?? (done < total ? `${busy}: ${Math.round((100 * done) / total)} %` : ""));
-  },
-  train: ({ folder, facts }) => {
-    $("build").hidden = false;
-    say($("build-heading"), `Trained: ${folder}`);
-    list($("facts"), facts);
-  },
+  train: trained,
   station: ({ why }) => {
     if (why) say($("refused"), why);
   },
@@ -123,7 +107,7 @@ function show(state) {
   if (stage === "waiting") {
     say($("prompt"), "Waiting for the glove …");
     for (const id of ["thing", "standing", "place"]) say($(id), "");
-    showKeys($("keys"), {});
+    leadBy({});
     return;
   }
   say($("place"), `${Math.min(number, total)} of ${total}; ${done} done${skipped ? `, ${skipped} skipped` : ""}`);
@@ -140,25 +124,29 @@ function show(state) {
     $("drawing").hidden = !known;
     say($("drawing-says"), known ? "" : `No picture of ${grasp}: hold the ${thing.replace(/^object /, "")} as you agreed.`);
   }
-  const focused = document.activeElement === document.body || $("leading").contains(document.activeElement);
-  const first = showKeys($("keys"), keys, (key) => ask("key", { name: key }), LETTERS);
-  // During a countdown Enter is not expected: no button has the focus, which it would press by accident.
+  leadBy(keys);
+}
+
+/** Show the keys that count now; the first is the one that Enter presses, and has the focus. */
+function leadBy(keys) {
+  const focused = !document.activeElement || document.activeElement === document.body || $("leading").contains(document.activeElement);
+  const first = showKeys(keys, (name) => ask("key", { name }), LETTERS);
+  // During the countdown Enter is expected next, not now: no button takes it by accident.
   if (focused && "accept" in keys) first?.focus();
 }
 
-
 document.addEventListener("keydown", (event) => {
   if (stage === "over" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
-  const button = event.target.closest?.("button, a, input, select");
+  const presses = event.target.closest?.("button, a, input, select");
   const found = Object.entries(LETTERS).find(([, letter]) => letter === event.key || letter === event.key.toLowerCase());
-  if (!found || (event.key === "Enter" && button)) return;
+  if (!found || (event.key === "Enter" && presses)) return;
   event.preventDefault();
   ask("key", { name: found[0] });
 });
 
 function showTrials({ trials, types, accuracy }) {
   const styles = typeStyles(types);
-  $("type").replaceChildren(...types.filter((type) => type !== "none").map((type) => new Option(type, type)));
+  fillMenu($("type"), types.filter((type) => type !== "none").map((type) => ({ id: type, name: type })));
   $("so-far").hidden = !trials.length;
   $("seen").hidden = true;
   say($("accuracy"), accuracyWords(accuracy));
@@ -166,15 +154,9 @@ function showTrials({ trials, types, accuracy }) {
   const keep = same < 0 ? Math.min(strip.children.length, trials.length) : same;
   while (strip.children.length > keep) strip.lastChild.remove();
   for (const [trial, grasp, thing] of trials.slice(keep)) {
-    const item = document.createElement("li"), button = document.createElement("button");
-    item.dataset.trial = trial;
-    button.type = "button";
-    button.className = "plain";
-    button.append(`${trial} `, tag(styles, grasp), document.createElement("span"));
-    button.title = thing;
-    button.addEventListener("click", () => ask("recorded", { trial }));
-    item.append(button);
-    strip.append(item);
+    const show = button(`${trial} `, () => ask("recorded", { trial }), { class: "plain", title: thing });
+    show.append(tag(styles, grasp), make("span"));
+    strip.append(make("li", { "data-trial": trial }, show));
   }
   markTrials();
   $("strip-scroll").scrollLeft = strip.scrollWidth;

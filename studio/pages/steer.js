@@ -1,125 +1,82 @@
 // Controls of the page Live in the studio: the build in use, the run, and recordings.
-import { say } from "./wire.js";
+import { $, button, fillMenu, make, say, tell } from "./wire.js";
 
 export class Steer {
   #ids;
-  #ask;
-  #parts = {};
-  #paths = {};
-  #members = null;
-  #doing = "";
-  #ended = "";
-  #lacking = "";
-  #unread = "";
+  #commands = { paths: {} };
+  #station = { doing: "" };
 
   /** @param {string[]} ids the recording and builds in the address of the page; none: it shows the run */
   constructor(section, ids, ask) {
-    [this.#ids, this.#ask] = [ids, ask];
+    this.#ids = ids;
+    const menu = (name, title, changed) => make("label", {}, `${title} `, make("select", { id: `steer-${name}`, onchange: changed }));
+    const show = () => this.#show(), open = () => location.assign(`live.html?${this.#chosen.map((id) => `id=${id}`).join("&")}`);
+    const run = [
+      menu("build", "Build in use", ({ target }) => ask("use-build", { id: target.value })),
+      button("Start", () => ask(this.#station.doing === "live" ? "halt" : "run"), { id: "steer-run" }),
+    ];
+    const replay = [
+      menu("recording", "Recording", show),
+      menu("first", "Build", show),
+      menu("second", "Compare with", show),
+      button("Show", open, { id: "steer-open" }),
+    ];
+    const back = make("a", { id: "back", href: "live.html" }, "Back to the run");
+    const sides = [
+      make("div", {}, make("div", { class: "row" }, ...(ids.length ? [back] : run)), make("code", { id: "run-command" })),
+      make("div", {}, make("div", { class: "row" }, ...replay), make("code", { id: "open-command" })),
+    ];
+    sides[0].append(make("p", { id: "doing", role: "status" }));
+    sides[1].append(make("p", { id: "lacking" }));
+    section.append(make("h2", { id: "steer-heading" }, ids.length ? "Recording" : "Run"), make("div", { class: "columns" }, ...sides));
     section.hidden = false;
-    section.append(made("h2", "steer-heading", ids.length ? "Recording" : "Run"));
-    const sides = section.appendChild(document.createElement("div"));
-    sides.className = "sides";
-    const [left, right] = [0, 1].map(() => sides.appendChild(document.createElement("div")));
-    const run = this.#row(left), replay = this.#row(right);
-    if (ids.length) {
-      const back = made("a", "back", "Back to the run");
-      back.href = "live.html";
-      run.append(back);
-    } else {
-      this.#choice(run, "build", "Build in use", (id) => ask("use-build", { id }));
-      this.#button(run, "run", "Start", () => ask(this.#doing === "live" ? "halt" : "run"));
-      this.#parts.doing = made("p", "doing");
-      this.#parts.doing.setAttribute("role", "status");
-      left.append(this.#command("run"), this.#parts.doing);
-    }
-    this.#choice(replay, "recording", "Recording", () => this.#show());
-    this.#choice(replay, "first", "Build", () => this.#show());
-    this.#choice(replay, "second", "Compare with", () => this.#show());
-    this.#button(replay, "open", "Show", () => location.assign(`live.html?${this.#chosen.map((id) => `id=${id}`).join("&")}`));
-    right.append(this.#command("open"));
   }
 
   /** Take the recordings and builds of the project. */
   project({ recordings, builds, state }) {
-    this.#members = { recordings, builds };
     const used = builds.find(({ name }) => name === state.build)?.id ?? "", [recording, first = used, second = ""] = this.#ids;
-    if (this.#parts.build) fill(this.#parts.build, [...(used ? [] : [{ id: "", name: "none" }]), ...builds], used);
-    fill(this.#parts.recording, recordings, this.#parts.recording.value || recording);
-    fill(this.#parts.first, builds, this.#parts.first.value || first);
-    fill(this.#parts.second, [{ id: "", name: "no other" }, ...builds], this.#parts.second.value || second);
+    if ($("steer-build")) {
+      fillMenu($("steer-build"), builds.length && !used ? [{ id: "", name: "none" }, ...builds] : builds);
+      $("steer-build").value = used;
+    }
+    fillMenu($("steer-recording"), recordings, recording ?? recordings[0]?.id);
+    fillMenu($("steer-first"), builds, first || builds[0]?.id);
+    fillMenu($("steer-second"), builds.length ? [{ id: "", name: "no other" }, ...builds] : [], second);
+    const lacks = [
+      builds.length ? "" : "The project has no build yet: train one on Choose or Record.",
+      recordings.length ? "" : "The project has no recording yet: make one on Record.",
+    ];
+    tell("lacking", lacks.filter(Boolean).join(" "));
     this.#show();
   }
 
   /** Take the commands. */
-  commands({ paths, run, why, unread }) {
-    [this.#paths, this.#lacking, this.#unread] = [paths, why, unread];
-    if (this.#parts.run) say(this.#parts["run-command"], run);
+  commands(commands) {
+    this.#commands = commands;
     this.#show();
   }
 
   /** Take what uses the glove, and why the last run ended. */
-  station({ doing, why }) {
-    [this.#doing, this.#ended] = [doing, why];
+  station(station) {
+    this.#station = station;
     this.#show();
   }
 
   get #chosen() {
-    return ["recording", "first", "second"].map((name) => this.#parts[name].value).filter(Boolean);
+    return ["recording", "first", "second"].map((name) => $(`steer-${name}`).value).filter(Boolean);
   }
 
   #show() {
-    const [recording, ...builds] = this.#chosen.map((id) => this.#paths[id]), enough = Boolean(recording && builds.length && this.#members?.recordings.length);
-    this.#parts.open.disabled = !enough;
-    if (this.#parts.run) {
-      const other = this.#doing && this.#doing !== "live" ? `The glove is in use: ${this.#doing}. Start ends that.` : "";
-      say(this.#parts.run, this.#doing === "live" ? "Stop" : "Start");
-      this.#parts.run.disabled = Boolean(this.#lacking);
-      say(this.#parts.doing, [this.#ended, this.#lacking, this.#unread, other].filter(Boolean).join(" "));
-    }
-    say(this.#parts["open-command"], enough ? `thenar monitor ${recording}${builds.map((build) => ` --build ${build}`).join("")}` : "");
+    const { paths, run, why, unread } = this.#commands, { doing, why: ended } = this.#station;
+    const [recording, ...builds] = this.#chosen.map((id) => paths[id]);
+    const enough = Boolean(recording && builds.length && $("steer-recording").value);
+    $("steer-open").disabled = !enough;
+    say($("open-command"), enough ? `thenar monitor ${recording}${builds.map((build) => ` --build ${build}`).join("")}` : "");
+    if (!$("steer-run")) return;
+    const other = doing && doing !== "live" ? `The glove is in use: ${doing}. Start ends that.` : "";
+    say($("steer-run"), doing === "live" ? "Stop" : "Start");
+    $("steer-run").disabled = Boolean(why);
+    say($("run-command"), run ?? "");
+    say($("doing"), [ended, why, unread, other].filter(Boolean).join(" "));
   }
-
-  #row(section) {
-    const row = section.appendChild(document.createElement("div"));
-    row.className = "row";
-    return row;
-  }
-
-  #choice(row, name, title, changed) {
-    const label = document.createElement("label"), select = made("select", `steer-${name}`);
-    label.append(title, " ", select);
-    select.addEventListener("change", () => changed(select.value));
-    row.append(label);
-    this.#parts[name] = select;
-  }
-
-  #button(row, name, title, press) {
-    const button = made("button", `steer-${name}`, title);
-    button.type = "button";
-    button.addEventListener("click", press);
-    row.append(button);
-    this.#parts[name] = button;
-  }
-
-  #command(name) {
-    const command = made("code", `${name}-command`);
-    this.#parts[`${name}-command`] = command;
-    return command;
-  }
-}
-
-function made(kind, id, text = "") {
-  const element = document.createElement(kind);
-  element.id = id;
-  element.textContent = text;
-  return element;
-}
-
-function fill(select, members, value) {
-  const names = members.map(({ id, name }) => `${id} ${name}`).join("\n");
-  if (select.dataset.names !== names) {
-    select.dataset.names = names;
-    select.replaceChildren(...members.map(({ id, name }) => new Option(name, id)));
-  }
-  if (members.some(({ id }) => id === value)) select.value = value;
 }

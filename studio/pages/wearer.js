@@ -1,11 +1,9 @@
 // The page Wearer: a few trials of a person, a build that is adapted to them, and the way back.
+import { listBoxes, ticked } from "./choice.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { cell, list, say } from "./wire.js";
+import { $, fillTable, list, say, tell } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
-
-let sets = []; // the wearer's sets, with their boxes
 let state = null; // the message on the wearer and the build
 let begun = false; // whether this page has just begun to record
 let awaited = false; // whether it has just asked to adapt
@@ -16,13 +14,12 @@ const ask = openPage({
     const { wearer, why } = message;
     if (document.activeElement !== $("subject")) $("subject").value = wearer;
     state = message;
-    $("empty").hidden = !why;
-    say($("empty"), why);
+    tell("empty", why);
     $("with-build").hidden = Boolean(why);
     if (!why) show(message);
   },
   chosen: ({ ids, counts, notes, command }) => {
-    if (String(ids) !== String(ticked())) return;
+    if (String(ids) !== String(ticked($("sets")))) return;
     const types = Object.entries(counts).map(([type, count]) => `${type} ${count}`);
     const lacking = state.types.filter((type) => !counts[type]);
     say($("counts"), `Trials: ${types.join(", ")}${lacking.length ? `; none of ${lacking.join(", ")}, which change as the others do` : ""}`);
@@ -38,13 +35,8 @@ const ask = openPage({
     say($("worst"), `${type}: ${after} of ${count}`);
     list($("warnings"), result.warnings);
     const styles = typeStyles(result.types.map(([name]) => name));
-    const rows = result.types.map(([name, ...counts]) => {
-      const row = document.createElement("tr"), title = cell("th", "");
-      title.append(tag(styles, name));
-      row.append(title, ...counts.map((one) => cell("td", String(one))));
-      return row;
-    });
-    $("types").replaceChildren(...rows);
+    const rows = result.types.map(([name, ...counts]) => [tag(styles, name), ...counts]);
+    fillTable("types", ["Type", "Trials", "Before", "After"], rows);
     if (awaited) $("result-heading").focus();
     awaited = false;
   },
@@ -55,44 +47,22 @@ const ask = openPage({
   station: ({ why }) => {
     if (why) say($("refused"), why);
   },
-  work: ({ done, total, what, why }) => {
-    say($("work"), why ?? (what === "adapt" && done < total ? "adapting …" : ""));
-  },
 });
 
 function show({ wearer, base, build, types, sets: members, glove, record, undo }) {
   say($("use"), build === base ? `${build}: that of everybody` : `${build}: adapted from ${base}`);
-  $("undo").hidden = !undo;
-  say($("undo"), `Undo: use ${undo} again`);
+  tell("undo", undo && `Undo: use ${undo} again`);
   say($("plan"), glove ? `Two trials of each of ${types.length} types; three if you add one.` : "The project has no glove.toml: connect a glove first.");
   for (const one of $("record").elements) one.disabled = !glove;
   say($("record-command"), record);
-  listSets(members);
-  say($("no-sets"), members.length ? "" : `no set holds only trials of ${wearer}`);
+  listBoxes($("sets"), members.map(({ id, name, size }) => ({ id, text: `${name}: ${size}`, checked: true })), choose);
+  tell("no-sets", !members.length && `no set holds only trials of ${wearer}`);
   choose();
 }
 
-function listSets(members) {
-  // Boxes that stay keep the focus.
-  if (JSON.stringify(members) === JSON.stringify(sets.map(({ member }) => member))) return;
-  const unticked = new Set(sets.filter(({ box }) => !box.checked).map(({ id }) => id));
-  sets = members.map((member) => {
-    const { id, name, size } = member;
-    const label = document.createElement("label"), box = document.createElement("input");
-    box.type = "checkbox";
-    box.checked = !unticked.has(id);
-    box.addEventListener("change", choose);
-    label.append(box, `${name}: ${size}`);
-    return { id, box, label, member };
-  });
-  $("sets").replaceChildren($("sets").firstElementChild, $("no-sets"), ...sets.map(({ label }) => label));
-}
-
-const ticked = () => sets.filter(({ box }) => box.checked).map(({ id }) => id);
-
 /** Ask what is in the ticked sets. */
 function choose() {
-  const ids = ticked();
+  const ids = ticked($("sets"));
   $("adapt").disabled = !ids.length;
   for (const id of ["counts", "adapt-command"]) say($(id), "");
   list($("notes"), []);
@@ -108,6 +78,6 @@ $("record").addEventListener("submit", (event) => {
   begun = ask("wear", { name: $("type").value });
 });
 $("adapt").addEventListener("click", () => {
-  awaited = ask("adapt", { ids: ticked() });
+  awaited = ask("adapt", { ids: ticked($("sets")) });
 });
 $("undo").addEventListener("click", () => ask("unwear"));

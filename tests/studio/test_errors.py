@@ -401,7 +401,7 @@ def test_a_build_says_what_it_was_trained_on(
     use(browser, "build", "build build; 54 of these 72 trials trained it; 5 sensors")
     reply = errors_of(opened, {"do": "errors", "name": "build"})
     assert browser.text("rate").startswith(f"{100 * reply['mean']:.1f} % [")
-    assert "none" in said(browser, "#confusion th")
+    assert "none" in said(browser, "#confusion-table th")
     browser.click("all-errors")
     cards(browser, len(misread(reply)))
     assert said(browser, "#trials article li")

@@ -1,35 +1,41 @@
 // The hand of a build, drawn from its hand.json: switches and taxels on the glove laid flat, joints as a posed hand.
 
 const SVG = "http://www.w3.org/2000/svg";
-const MARGIN = 5;
 const NARROW = 560; // up to this width, in pixels, the parts are drawn one below the other
 const LEAST_UNIT = 0.3; // minimum millimetres per pixel, so that few inputs are not drawn huge
 const LETTER = 9.5; // minimum size of a letter, pixels
 const FINGER = 6; // minimum half size of a button, pixels, if there is room
 
-function element(name, attributes = {}, parent = null) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (parent) parent.append(made);
-  return made;
+/** Return a new element of a drawing with these attributes, and texts and elements in it. */
+export function draw(kind, attributes = {}, ...children) {
+  const element = document.createElementNS(SVG, kind);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
 }
 
-function named(parent, words) {
-  element("title", {}, parent).textContent = words;
+/** Make an element of a drawing a button, by pointer and keys, and return it. */
+export function pressable(element, name, press) {
+  const attributes = { role: "button", tabindex: 0, "aria-label": name, "aria-pressed": false };
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  element.addEventListener("click", press);
+  element.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    event.preventDefault();
+    if (!event.repeat) press();
+  });
+  return element;
 }
 
 const path = (points, closed) =>
   points.length ? `M${points.map(([x, y]) => `${x} ${-y}`).join(" ")}${closed ? "Z" : ""}` : "";
 
-function bounds(points) {
-  const xs = points.map(([x]) => x), ys = points.map(([, y]) => -y);
-  const reduce = (values, pick, start) => values.reduce((a, b) => pick(a, b), start);
-  const left = reduce(xs, Math.min, Infinity), top = reduce(ys, Math.min, Infinity);
-  return { left, top, width: reduce(xs, Math.max, -Infinity) - left, height: reduce(ys, Math.max, -Infinity) - top };
-}
-
-function grown(box, sides, ends = sides) {
-  return { left: box.left - sides, top: box.top - ends, width: box.width + 2 * sides, height: box.height + 2 * ends };
+// The box around points, with margins.
+function around(points, [sides, ends]) {
+  const reduce = (axis, pick, start) => points.reduce((most, point) => pick(most, point[axis]), start);
+  const [left, right] = [reduce(0, Math.min, Infinity), reduce(0, Math.max, -Infinity)];
+  const [low, high] = [reduce(1, Math.min, Infinity), reduce(1, Math.max, -Infinity)];
+  return { left: left - sides, top: -high - ends, width: right - left + 2 * sides, height: high - low + 2 * ends };
 }
 
 // Keep the beginning of a long name, and its end, which often has a number.
@@ -41,154 +47,105 @@ function shortened(name, most) {
 /* ---- The glove laid flat ---- */
 
 class Glove {
-  // states: for each kept bit, whether it is closed and lost. spots: for each kept bit, the group that shows it.
-  constructor(parent, hand, onSwitch) {
-    this.group = element("g", {}, parent);
-    this.hand = hand;
-    this.radius = hand.radius_mm;
-    this.closed = [];
-    this.lost = [];
-    this.taxels = [];
-    this.switches = [];
-    this.areas = [];
-    element("path", { class: "skin", d: path(hand.outline, true) }, this.group);
-    for (const strip of hand.strips) element("path", { class: "side", d: path(strip, true) }, this.group);
-    for (const crease of hand.creases) element("path", { class: "crease", d: path(crease, false) }, this.group);
-    for (const { name, x_mm, y_mm } of hand.labels) this.#words(name, x_mm, -y_mm);
-    const all = [...hand.switches, ...hand.taxels];
-    for (const each of all.filter((one) => !this.#kept(one).length)) this.#spare(each);
-    for (const each of hand.switches) if (each.bit !== undefined) this.#switch(each, onSwitch);
-    for (const each of hand.taxels) this.#taxel(each, onSwitch);
+  #hand;
+  #closed = []; // whether each kept bit is
+
+  constructor(hand, onSwitch) {
+    this.#hand = hand;
+    const bits = (one) => (one.levels ? one.levels.map(([, bit]) => bit) : one.bit === undefined ? [] : [one.bit]);
+    const all = [...hand.switches, ...hand.taxels], kept = all.filter((one) => bits(one).length);
+    this.group = draw(
+      "g",
+      {},
+      draw("path", { class: "skin", d: path(hand.outline, true) }),
+      ...hand.strips.map((strip) => draw("path", { class: "side", d: path(strip, true) })),
+      ...hand.creases.map((crease) => draw("path", { class: "crease", d: path(crease, false) })),
+      ...hand.labels.map(({ name, x_mm, y_mm }) => draw("text", { x: x_mm, y: -y_mm, class: "middle" }, name)),
+    );
+    for (const one of all) if (!bits(one).length) this.#place(one, draw("circle", { class: "spare", r: 0.8 * hand.radius_mm }));
+    this.spots = kept.map((one) => this.#spot(one, bits(one), onSwitch));
+    this.taxels = hand.taxels.map(({ name }) => this.spots.find((spot) => spot.disc && spot.name === name));
     const points = [...hand.outline, ...hand.strips.flat(), ...[...all, ...hand.labels].map((one) => [one.x_mm, one.y_mm])];
-    this.box = points.length ? grown(bounds(points), hand.placed ? 12 : 22, hand.placed ? MARGIN : 16) : null;
-    this.spacing = spacing(all.filter((one) => this.#kept(one).length));
+    this.box = points.length ? around(points, hand.placed ? [12, 5] : [22, 16]) : null;
+    this.spacing = spacing(kept);
   }
 
-  #kept(one) {
-    return one.levels ? one.levels.map(([, bit]) => bit) : one.bit === undefined ? [] : [one.bit];
-  }
-
-  #words(text, x, y) {
-    const made = element("text", { x, y, class: "middle" }, this.group);
-    made.textContent = text;
-    return made;
-  }
-
-  #place({ name, x_mm, y_mm }, kind) {
-    const group = element("g", { class: kind, transform: `translate(${x_mm} ${-y_mm})` }, this.group);
-    if (!this.hand.placed) this.#words(shortened(name, 13), x_mm, -y_mm + 3.8 * this.radius);
+  #place({ name, x_mm, y_mm }, ...parts) {
+    const { placed, radius_mm: radius } = this.#hand;
+    const group = draw("g", { class: "spot", transform: `translate(${x_mm} ${-y_mm})` }, ...parts, draw("title", {}, name));
+    this.group.append(group);
+    if (!placed) this.group.append(draw("text", { x: x_mm, y: -y_mm + 3.8 * radius, class: "middle" }, shortened(name, 13)));
     return group;
   }
 
-  #spare(each) {
-    const group = this.#place(each, "spot");
-    element("circle", { class: "spare", r: this.radius * 0.8 }, group);
-    named(group, each.name);
-  }
-
-  #button(group, name, press) {
-    this.areas.push(element("circle", { class: "area", r: this.radius * 2 }, group));
-    group.setAttribute("role", "button");
-    group.setAttribute("tabindex", "0");
-    group.setAttribute("aria-label", name);
-    group.setAttribute("aria-pressed", "false");
-    group.addEventListener("click", press);
-    group.addEventListener("keydown", (event) => {
-      if (event.key !== "Enter" && event.key !== " ") return;
-      event.preventDefault();
-      if (!event.repeat) press();
-    });
-  }
-
-  // Open: a ring. Closed: a full square, larger, on a corner. Lost: a cross in a dashed ring.
-  #switch(each, onSwitch) {
-    const group = this.#place(each, "spot"), r = this.radius;
-    element("circle", { class: "open", r: 1.25 * r }, group);
-    element("path", { class: "shut", d: `M0 ${-2 * r}L${2 * r} 0L0 ${2 * r}L${-2 * r} 0Z` }, group);
-    element("path", { class: "cross", d: cross(r) }, group);
-    named(group, each.name);
-    if (onSwitch) this.#button(group, each.name, () => onSwitch(each.bit, !this.closed[each.bit]));
-    this.switches.push({ bit: each.bit, group });
-  }
-
-  // A square; a disc in it shows how far it is pressed; with all levels closed the square is full.
-  #taxel(each, onSwitch) {
-    if (!each.levels?.length) {
-      this.taxels.push({ ...each, levels: [], group: null });
-      return;
-    }
-    const group = this.#place(each, "spot"), r = this.radius, side = 1.35 * r;
-    const found = { levels: each.levels, name: each.name, group, count: 0, value: null };
-    element("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }, group);
-    found.disc = element("circle", { class: "press", r: 0 }, group);
-    element("path", { class: "shut", d: `M${-side} ${-side}H${side}V${side}H${-side}Z` }, group);
-    element("path", { class: "cross", d: cross(r) }, group);
-    named(group, each.name);
-    if (onSwitch) {
-      this.#button(group, each.name, () => {
-        // From level to level, and from the last to none.
-        const next = (found.count + 1) % (found.levels.length + 1);
-        found.levels.forEach(([, bit], at) => {
-          if (!this.closed[bit] === at < next) onSwitch(bit, at < next);
-        });
+  // A switch: a ring, and closed a full square, larger, on a corner. A taxel: a square, and in it a disc that shows how
+  // far it is pressed; with all levels closed the square is full. Lost: a cross in a dashed line.
+  #spot(one, bits, onSwitch) {
+    const r = this.#hand.radius_mm, side = 1.35 * r, area = draw("circle", { class: "area", r: 2 * r });
+    const disc = one.levels ? draw("circle", { class: "press", r: 0 }) : null, parts = disc
+      ? [
+        draw("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }),
+        disc,
+        draw("path", { class: "shut", d: `M${-side} ${-side}H${side}V${side}H${-side}Z` }),
+      ]
+      : [
+        draw("circle", { class: "open", r: 1.25 * r }),
+        draw("path", { class: "shut", d: `M0 ${-2 * r}L${2 * r} 0L0 ${2 * r}L${-2 * r} 0Z` }),
+      ];
+    const cross = draw("path", { class: "cross", d: `M${-r} ${-r}L${r} ${r}M${r} ${-r}L${-r} ${r}` });
+    const group = this.#place(one, ...parts, cross), spot = { name: one.name, bits, group, disc, area, count: 0, value: null };
+    if (!onSwitch) return spot;
+    // From level to level, and from the last to none.
+    const press = () => {
+      const next = (spot.count + 1) % (bits.length + 1);
+      bits.forEach((bit, at) => {
+        if (!this.#closed[bit] === at < next) onSwitch(bit, at < next);
       });
-    }
-    this.taxels.push(found);
+    };
+    pressable(group, one.name, press).append(area);
+    return spot;
   }
 
   setClosed(bits, lost) {
-    const gone = lost ?? [];
-    for (const { bit, group } of this.switches) {
-      const closed = Boolean(bits[bit]), missing = Boolean(gone[bit]);
-      if (closed === this.closed[bit] && missing === this.lost[bit]) continue;
-      group.classList.toggle("closed", closed);
-      group.classList.toggle("lost", missing);
-      if (group.hasAttribute("role")) group.setAttribute("aria-pressed", String(closed));
+    this.#closed = Array.from(bits, Boolean);
+    for (const spot of this.spots) {
+      const { bits: levels, group, name } = spot, count = levels.filter((bit) => bits[bit]).length, all = count === levels.length;
+      group.classList.toggle("lost", levels.some((bit) => lost?.[bit]));
+      if (count === spot.count) continue;
+      spot.count = count;
+      group.classList.toggle("closed", all);
+      if (group.hasAttribute("role")) {
+        group.setAttribute("aria-pressed", all ? "true" : count ? "mixed" : "false");
+        if (spot.disc) group.setAttribute("aria-label", name + (levels.length > 1 ? `, ${count} of ${levels.length} levels closed` : ""));
+      }
+      if (spot.disc && spot.value === null) this.#press(spot, count / levels.length);
     }
-    this.closed = Array.from(bits, Boolean);
-    this.lost = Array.from(gone, Boolean);
-    for (const each of this.taxels) if (each.group) this.#levels(each);
   }
 
-  #levels(taxel) {
-    const bits = taxel.levels.map(([, bit]) => bit), count = bits.filter((bit) => this.closed[bit]).length;
-    taxel.group.classList.toggle("lost", bits.some((bit) => this.lost[bit]));
-    if (count === taxel.count) return;
-    taxel.count = count;
-    taxel.group.classList.toggle("closed", count === bits.length);
-    if (taxel.group.hasAttribute("role")) {
-      taxel.group.setAttribute("aria-pressed", count === bits.length ? "true" : count ? "mixed" : "false");
-      const of = bits.length > 1 ? `, ${count} of ${bits.length} levels closed` : "";
-      taxel.group.setAttribute("aria-label", taxel.name + of);
-    }
-    if (taxel.value === null) this.#press(taxel, count / bits.length);
-  }
-
-  #press(taxel, share) {
-    taxel.disc.setAttribute("r", (1.2 * this.radius * Math.sqrt(Math.min(Math.max(share, 0), 1))).toFixed(2));
+  #press({ disc }, share) {
+    disc.setAttribute("r", (1.2 * this.#hand.radius_mm * Math.sqrt(Math.min(Math.max(share, 0), 1))).toFixed(2));
   }
 
   setTaxels(values) {
     this.taxels.forEach((taxel, at) => {
-      if (!taxel.group || (values[at] ?? null) === taxel.value) return;
-      taxel.value = values[at] ?? null;
-      this.#press(taxel, taxel.value ?? taxel.count / taxel.levels.length);
+      const value = values[at] ?? null;
+      if (!taxel || value === taxel.value) return;
+      taxel.value = value;
+      this.#press(taxel, value ?? taxel.count / taxel.bits.length);
     });
   }
 
   // One pixel of the screen is `unit` of the drawing.
   fit(unit) {
-    const reach = Math.max(2 * this.radius, Math.min(2 * FINGER * unit, this.spacing / 2));
-    for (const area of this.areas) area.setAttribute("r", reach.toFixed(2));
+    const reach = Math.max(2 * this.#hand.radius_mm, Math.min(2 * FINGER * unit, this.spacing / 2));
+    for (const { area } of this.spots) area.setAttribute("r", reach.toFixed(2));
   }
 
   get said() {
-    const closed = this.switches.filter(({ bit }) => this.closed[bit]).length;
-    return this.switches.length ? `${closed} of ${this.switches.length} switches closed` : "";
+    const switches = this.spots.filter(({ disc }) => !disc), closed = switches.filter(({ count }) => count).length;
+    return switches.length ? `: ${closed} of ${switches.length} switches closed` : "";
   }
 }
-
-const cross = (r) => `M${-r} ${-r}L${r} ${r}M${r} ${-r}L${-r} ${r}`;
 
 function spacing(places) {
   let least = Infinity;
@@ -276,94 +233,74 @@ function chain(base, ahead, flex, lengths, bends) {
   return points;
 }
 
-class Posed {
-  constructor(parent, joints) {
-    this.group = element("g", {}, parent);
-    this.joints = joints;
-    this.values = joints.map(() => null);
-    this.box = { left: -72, top: -202, width: 152, height: 246 };
-    this.forearm = element("path", { class: "flesh" }, this.group);
-    this.palm = element("path", { class: "flesh" }, this.group);
-    this.digits = {};
-    for (const [digit, { width }] of Object.entries(DIGITS)) {
-      const group = element("g", {}, this.group);
-      named(group, digit);
-      this.digits[digit] = [
-        element("path", { class: "edge", "stroke-width": width }, group),
-        element("path", { class: "bone", "stroke-width": width - 1.6 }, group),
-        element("path", { class: "axis" }, group),
-      ];
-    }
-    this.draw();
-  }
-
-  #angles(values) {
-    const angles = {};
-    this.joints.forEach((joint, at) => {
-      if (values[at] !== null) (angles[joint.digit] ??= {})[joint.moves] = degrees(joint, values[at]);
-    });
-    return angles;
-  }
-
-  set(values) {
-    const own = this.joints.map((joint) => values[joint.joint] ?? null);
-    if (own.every((value, at) => value === this.values[at])) return;
-    this.values = own;
-    this.draw();
-  }
-
-  draw() {
-    const pose = posed(this.#angles(this.values)), line = (points, closed) => rounded(path(points, closed));
-    this.forearm.setAttribute("d", line(pose.forearm, false));
-    this.palm.setAttribute("d", line(pose.palm, true));
-    for (const [digit, parts] of Object.entries(this.digits)) {
-      for (const part of parts) part.setAttribute("d", line(pose.chains[digit], false));
-    }
-    // A part of the hand is marked while one of its joints is lost.
-    const lost = new Set(this.joints.filter((_, at) => this.values[at] === null).map(({ digit }) => digit));
-    for (const [digit, [part]] of Object.entries(this.digits)) part.parentNode.classList.toggle("gone", lost.has(digit));
-    this.palm.classList.toggle("gone", lost.has("palm") || lost.has("wrist"));
-  }
-
-  fit() {}
-}
-
 const rounded = (text) => text.replace(/-?\d+\.\d+(e-?\d+)?/g, (number) => Number(number).toFixed(1));
+
+function posedHand(joints) {
+  const [forearm, palm] = [draw("path", { class: "flesh" }), draw("path", { class: "flesh" })];
+  const digits = Object.entries(DIGITS).map(([digit, { width }]) => {
+    const parts = [
+      draw("path", { class: "edge", "stroke-width": width }),
+      draw("path", { class: "bone", "stroke-width": width - 1.6 }),
+      draw("path", { class: "axis" }),
+    ];
+    return { digit, parts, group: draw("g", {}, draw("title", {}, digit), ...parts) };
+  });
+  let before = null;
+  const set = (values) => {
+    const own = joints.map((joint) => values[joint.joint] ?? null), angles = {};
+    if (before && own.every((value, at) => value === before[at])) return;
+    before = own;
+    joints.forEach((joint, at) => {
+      if (own[at] !== null) (angles[joint.digit] ??= {})[joint.moves] = degrees(joint, own[at]);
+    });
+    const pose = posed(angles), line = (points, closed) => rounded(path(points, closed));
+    forearm.setAttribute("d", line(pose.forearm, false));
+    palm.setAttribute("d", line(pose.palm, true));
+    // A part of the hand is marked while one of its joints is lost.
+    const lost = new Set(joints.filter((_, at) => own[at] === null).map(({ digit }) => digit));
+    for (const { digit, parts, group } of digits) {
+      for (const part of parts) part.setAttribute("d", line(pose.chains[digit], false));
+      group.classList.toggle("gone", lost.has(digit));
+    }
+    palm.classList.toggle("gone", lost.has("palm") || lost.has("wrist"));
+  };
+  set([]);
+  const group = draw("g", {}, forearm, palm, ...digits.map((one) => one.group));
+  return { group, set, box: { left: -72, top: -202, width: 152, height: 246 } };
+}
 
 /* ---- Joints of which nobody knows where they are: needles, from level to upright ---- */
 
-class Dials {
-  constructor(parent, joints) {
-    this.group = element("g", {}, parent);
-    this.joints = joints;
-    const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length)))), [wide, high] = [46, 46];
-    this.box = { left: 0, top: 0, width: wide * columns, height: high * Math.ceil(joints.length / columns) };
-    this.needles = joints.map((joint, at) => {
-      const x = wide * (at % columns) + 9, y = high * Math.floor(at / columns) + 34;
-      const group = element("g", { transform: `translate(${x} ${y})` }, this.group);
-      element("path", { class: "dial", d: "M0 0H26A26 26 0 0 0 0 -26Z" }, group);
-      const needle = element("path", { class: "needle", d: "M0 0H26" }, group);
-      const handle = element("path", { class: "handle", d: "M-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0 -5.2 0" }, group);
-      element("text", { x: 13, y: 9, class: "middle" }, group).textContent = shortened(joint.name, 12);
-      named(group, joint.name);
-      return { group, needle, handle };
-    });
-    this.set([]);
-  }
-
-  set(values) {
-    this.joints.forEach((joint, at) => {
+function dials(joints) {
+  const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length)))), size = 46;
+  const needles = joints.map(({ name }, at) => {
+    const needle = draw("path", { class: "needle", d: "M0 0H26" });
+    const handle = draw("path", { class: "handle", d: "M-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0 -5.2 0" });
+    const group = draw(
+      "g",
+      { transform: `translate(${size * (at % columns) + 9} ${size * Math.floor(at / columns) + 34})` },
+      draw("path", { class: "dial", d: "M0 0H26A26 26 0 0 0 0 -26Z" }),
+      needle,
+      handle,
+      draw("text", { x: 13, y: 9, class: "middle" }, shortened(name, 12)),
+      draw("title", {}, name),
+    );
+    return { group, needle, handle };
+  });
+  const set = (values) => {
+    joints.forEach((joint, at) => {
       const value = values[joint.joint] ?? null, span = joint.high - joint.low;
       const share = value === null || !(span > 0) ? 0 : Math.min(Math.max((value - joint.low) / span, 0), 1);
-      const angle = (share * Math.PI) / 2, x = 26 * Math.cos(angle), y = -26 * Math.sin(angle);
-      const { group, needle, handle } = this.needles[at];
-      needle.setAttribute("d", `M0 0L${x.toFixed(1)} ${y.toFixed(1)}`);
-      handle.setAttribute("transform", `translate(${x.toFixed(1)} ${y.toFixed(1)})`);
+      const angle = (share * Math.PI) / 2, end = `${(26 * Math.cos(angle)).toFixed(1)} ${(-26 * Math.sin(angle)).toFixed(1)}`;
+      const { group, needle, handle } = needles[at];
+      needle.setAttribute("d", `M0 0L${end}`);
+      handle.setAttribute("transform", `translate(${end})`);
       group.classList.toggle("gone", value === null);
     });
-  }
-
-  fit() {}
+  };
+  set([]);
+  const box = { left: 0, top: 0, width: size * columns, height: size * Math.ceil(joints.length / columns) };
+  return { group: draw("g", {}, ...needles.map((one) => one.group)), set, box };
 }
 
 /* ---- All of it ---- */
@@ -382,17 +319,14 @@ class Dials {
  * setPose(values)        the value of each of hand.joints, in its unit; null: lost
  */
 export function drawHand(svg, hand, { onSwitch = null } = {}) {
-  svg.replaceChildren();
+  const glove = new Glove(hand, onSwitch), placed = hand.joints.filter((joint) => joint.digit);
+  const others = hand.joints.filter((joint) => !joint.digit);
+  const joints = [...(placed.length ? [posedHand(placed)] : []), ...(others.length ? [dials(others)] : [])];
+  const parts = [...(glove.box ? [glove] : []), ...joints];
+  svg.replaceChildren(glove.group, ...joints.map(({ group }) => group));
   svg.classList.add("hand");
-  const glove = new Glove(svg, hand, onSwitch), placed = hand.joints.filter((joint) => joint.digit);
-  const others = hand.joints.filter((joint) => !joint.digit), parts = [];
-  if (glove.box) parts.push(glove);
-  const joints = [];
-  if (placed.length) joints.push(new Posed(svg, placed));
-  if (others.length) joints.push(new Dials(svg, others));
-  parts.push(...joints);
   svg.setAttribute("role", onSwitch ? "group" : "img");
-  const say = () => svg.setAttribute("aria-label", ["The hand", onSwitch ? "" : glove.said].filter(Boolean).join(": "));
+  const say = () => svg.setAttribute("aria-label", `The hand${onSwitch ? "" : glove.said}`);
   say();
 
   let wide = -1;
@@ -414,13 +348,13 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
     svg.setAttribute("viewBox", `${((broad - whole) / 2).toFixed(1)} 0 ${whole.toFixed(1)} ${tall.toFixed(1)}`);
     const unit = whole / width;
     svg.style.setProperty("--letter", `${(LETTER * unit).toFixed(2)}px`);
-    for (const part of parts) part.fit(unit);
+    if (glove.box) glove.fit(unit);
   };
   arrange();
   new ResizeObserver(arrange).observe(svg);
 
   return {
-    setClosed(bits, lost = null) {
+    setClosed(bits, lost) {
       glove.setClosed(bits, lost);
       if (!onSwitch) say();
     },

@@ -3,8 +3,8 @@ import { Replay } from "./replay.js";
 import { openPage } from "./shell.js";
 import { Timeline } from "./timeline.js";
 import { View } from "./view.js";
+import { $ } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
 // In the studio the address names a recording, and the builds to compare on it.
 const ids = new URLSearchParams(location.search).getAll("id");
 const view = new View();
@@ -47,6 +47,7 @@ const ask = openPage({
 function begin(about, live = true) {
   if (live && build !== null && build !== about.name) view.tell(`The run goes on with ${about.name}, before it was ${build}.`);
   build = about.name;
+  for (const section of document.querySelectorAll("section.data")) section.hidden = false;
   timeline.types(about.grasps);
   view.build(about, live);
 }

@@ -1,8 +1,7 @@
 // A recording on its page: this page's position in it, which plays here, and what it asks the server for.
 import { differs, spanAt, Track } from "./timeline.js";
-import { say } from "./wire.js";
+import { $, say } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
 const ASK_MS = 80, LATER_MS = 500; // the server takes 20 requests a second
 const FRAME_MS = 40; // while it plays
 const AHEAD_US = 1_000_000, STEP_US = 33_000; // of moments asked for at once, at normal speed
@@ -190,4 +189,3 @@ function longest(announced, { from, to }, until) {
   }
   return [...lengths].sort(([, one], [, other]) => other - one)[0]?.[0];
 }
-

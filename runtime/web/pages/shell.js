@@ -1,95 +1,96 @@
-// The frame of every page: the bar on top, the links to the other pages, and the connection to the server.
+// The frame of every page: the bar on top, the links to the other pages, the connection to the server, its work, and
+// what it refuses.
 import { clock } from "./state.js";
-import { connect, say } from "./wire.js";
+import { $, button, connect, make, say, tell } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
+/** What the server does, in words. */
+export const WORK = {
+  reading: "reading", measure: "measuring", curve: "measuring the curve", train: "training", adapt: "adapting",
+  compare: "comparing", report: "exporting", firmware: "writing firmware",
+};
 
 /**
- * Fill the page's bar, and connect to its server.
+ * Make the page's bar, and connect to its server.
  * @param {Object<string, function(object): void>} handlers as for `connect`; a page gets the topics that it handles
  * @returns {function(string, object=): boolean} ask(what, more): send a request; what is refused is said in #refused
  */
 export function openPage(handlers) {
   let lasts; // until what is said of the glove is too old
-  const bar = document.querySelector("header");
-  const title = document.createElement("h1"), brand = document.createElement("span"), badges = document.createElement("p");
-  brand.className = "brand";
-  brand.textContent = "thenar";
-  title.append(brand, " ", made("span", "name"));
-  for (const id of ["wearer", "glove-state", "build-state", "link"]) badges.append(made("span", id, "badge"), " ");
-  bar.append(title, badges, made("nav", "pages"));
-  $("pages").setAttribute("aria-label", "Pages");
-  for (const id of ["wearer", "glove-state", "build-state"]) $(id).hidden = true;
+  const badges = ["wearer", "glove-state", "build-state", "link"].map((id) => make("span", { id, class: "badge", hidden: true }));
+  const title = make("h1", {}, make("span", { class: "brand" }, "thenar"), " ", make("span", { id: "name" }));
+  const pages = make("nav", { id: "pages", "aria-label": "Pages" });
+  document.head.append(make("link", { rel: "icon", href: "icon.svg" }));
+  const cancel = button("Cancel", () => send({ do: "cancel" }), { id: "cancel", class: "plain", hidden: true });
+  const busy = make("p", { class: "row" }, make("span", { id: "work", role: "status" }), cancel);
+  const refused = make("p", { id: "refused", role: "alert" });
+  document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages, busy, refused));
   link(false, "connecting");
   const send = connect({
-    ...handlers,
-    open: () => {
-      link(true, `connected since ${clock(performance.now())}`);
-      handlers.open?.();
-    },
+    work,
+    shell: show,
+    open: () => link(true, `connected since ${clock(performance.now())}`),
     closed: () => {
       link(false, `not connected since ${clock(performance.now())}`);
       clearTimeout(lasts);
       glove("warn", $("glove-state").hidden ? "" : "not known");
-      handlers.closed?.();
     },
-    shell: (message) => {
-      show(message);
-      handlers.shell?.(message);
-    },
-    glove: (message) => {
+    glove: ({ is, words, lasts_s: until }) => {
       const since = clock(performance.now());
       clearTimeout(lasts);
-      if (message.lasts_s) lasts = setTimeout(() => glove("bad", `silent since ${since}`), 1000 * message.lasts_s);
-      glove(message.is, message.words);
-      handlers.glove?.(message);
+      if (until) lasts = setTimeout(() => glove("bad", `silent since ${since}`), 1000 * until);
+      glove(is, words);
     },
-    refused: (message) => {
-      if ($("refused")) say($("refused"), message.why);
-      handlers.refused?.(message);
-    },
-  });
+    refused: ({ why }) => say(refused, why),
+  }, handlers);
   return (what, more = {}) => {
     const sent = send({ do: what, ...more });
-    if ($("refused")) say($("refused"), sent ? "" : "not connected");
+    say(refused, sent ? "" : "not connected");
     return sent;
   };
 }
 
-function made(kind, id, name = "") {
-  const element = document.createElement(kind);
-  element.id = id;
-  element.className = name;
-  return element;
-}
-
 function link(up, words) {
   $("link").dataset.is = up ? "good" : "bad";
-  say($("link"), `page: ${words}`);
+  tell("link", `page: ${words}`);
 }
 
 function glove(level, words) {
-  $("glove-state").hidden = !words;
   $("glove-state").dataset.is = level;
-  say($("glove-state"), `glove: ${words}`);
+  tell("glove-state", words && `glove: ${words}`);
 }
 
 function show({ project, pages, wearer, build, rate }) {
   say($("name"), project);
-  for (const [id, words] of [["wearer", wearer && `wearer: ${wearer}`], ["build-state", build && `build: ${build}${rate && `, ${rate}`}`]]) {
-    $(id).hidden = !words;
-    say($(id), words);
-  }
+  tell("wearer", wearer && `wearer: ${wearer}`);
+  tell("build-state", build && `build: ${build}${rate && `, ${rate}`}`);
   // The address of the first page may have no name: its module has.
   const here = new URL(document.querySelector("script[type=module]").src).pathname.slice(1).replace(".js", ".html");
-  const links = pages.map(([file, title]) => {
-    const found = document.createElement("a");
-    found.href = file;
-    found.textContent = title;
-    if (file === here) found.setAttribute("aria-current", "page");
-    return found;
-  });
+  const links = pages.map(([href, title]) => make("a", { href, ...(href === here ? { "aria-current": "page" } : {}) }, title));
   // Links that stay keep the focus.
   if (String([...$("pages").children]) !== String(links)) $("pages").replaceChildren(...links);
   $("pages").hidden = links.length < 2;
+}
+
+let working = null; // what is done now, and when it will be finished
+
+function work({ done, total, what, why, left_s: left }) {
+  working = done < total ? { what, share: done / total, end: left == null ? null : performance.now() + 1000 * left } : null;
+  $("cancel").hidden = !working || what === "reading";
+  if (working) countDown();
+  else say($("work"), why ?? "");
+}
+
+/** Say how far the work is, and how long it takes still. */
+function countDown() {
+  const { what, share, end } = working, left = end === null ? null : (end - performance.now()) / 1000;
+  const time = left === null ? "" : left > 1 ? `, about ${duration(left)} left` : ", any moment now";
+  say($("work"), `${WORK[what] ?? what}: ${Math.round(100 * share)} %${time}`);
+}
+
+setInterval(() => working && countDown(), 1000);
+
+/** Return a duration in words. */
+export function duration(seconds) {
+  if (seconds < 10) return `${Math.max(1, Math.round(seconds))} s`;
+  return seconds < 100 ? `${5 * Math.round(seconds / 5)} s` : `${Math.round(seconds / 60)} min`;
 }

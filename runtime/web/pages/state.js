@@ -1,5 +1,5 @@
 // Whether what a page shows is current: the age of its data, and its link to the server.
-import { say } from "./wire.js";
+import { $, say } from "./wire.js";
 
 const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
 
@@ -51,15 +51,10 @@ export class State {
     const silent = this.live && age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
     const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
     const words = this.#link === null ? "" : !up ? `no data${since || " yet"}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "";
-    say(document.getElementById("age"), words);
+    say($("age"), words);
     document.documentElement.classList.toggle("old", old);
     if (old === this.old) return;
     this.old = old;
     this.changed(old);
   }
-}
-
-/** Return a count of what can be read: "5 of 31 switches closed", "5 of 20 readable switches closed; 11 lost". */
-export function counted(count, total, lost, what) {
-  return lost ? `${count} of ${total - lost} readable ${what}; ${lost} lost` : `${count} of ${total} ${what}`;
 }

@@ -1,16 +1,13 @@
 // One axis of time for runs and recordings: lanes of spans on a canvas, a cursor, zoom, and keys. All times are in
 // microseconds.
 import { typeStyles } from "./types.js";
-import { say } from "./wire.js";
+import { $, clearedPen, colours, redraw, say } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
 const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second, and words change so often
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
-
-let style = null; // the colours of the page, until its scheme changes
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
 export class Track {
@@ -19,6 +16,7 @@ export class Track {
     this.announced = [];
     this.segments = [];
     this.health = [];
+    this.errors = { wrong: [], early: [] };
     this.untilUs = null;
   }
 
@@ -94,12 +92,12 @@ export class Timeline {
   last = null;
   at = null; // the cursor; null follows now
   dated = 0; // what makes time of day of a time of a run
-  #errors = []; // by track
   #from = 0;
   #span = USUAL_US;
   #wide = 0;
   #whole = false; // while a recording is read, the window has all of it, until somebody zooms
   #styles = typeStyles([]);
+  #colours = null; // of the page
   #pointers = new Map();
   #moved = 0;
   #drawing = false;
@@ -112,15 +110,16 @@ export class Timeline {
   constructor(canvas, on) {
     this.canvas = canvas;
     this.on = on;
-    canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const { left, width } = canvas.getBoundingClientRect(), across = event.shiftKey ? event.deltaY : event.deltaX;
+      if (across) this.#pan((across / width) * this.#span);
+      else this.#zoom(1.002 ** event.deltaY, this.#from + ((event.clientX - left) / width) * this.#span);
+    }, { passive: false });
     for (const kind of ["down", "move", "up", "cancel"]) {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
-    new ResizeObserver(() => this.draw()).observe(canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      style = null;
-      this.draw();
-    });
+    redraw(canvas, () => this.draw());
     const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
     for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
     addEventListener("keydown", (event) => this.#key(event));
@@ -173,8 +172,8 @@ export class Timeline {
     [this.first, this.last] = [first, last];
     if (fresh || this.#whole) this.#show(first, last - first);
     this.#whole = fresh || this.#whole;
-    this.#errors = this.tracks.map((track) => errors(this.truth, track.announced));
-    for (const id of ["next-error", "last-error"]) $(id).disabled = !this.#errors.some(({ wrong }) => wrong.length);
+    for (const track of this.tracks) track.errors = errors(this.truth, track.announced);
+    for (const id of ["next-error", "last-error"]) $(id).disabled = this.tracks.every(({ errors: { wrong } }) => !wrong.length);
     this.draw();
   }
 
@@ -210,11 +209,10 @@ export class Timeline {
   // Lanes of bars of a kind: types, troubles, or errors over what came before the right type, lower.
   #lanes() {
     const lanes = this.truth.length ? [["truth", ["type", this.truth]]] : [];
-    this.tracks.forEach(({ name, announced }, number) => {
-      const { wrong, early } = this.#errors[number] ?? { wrong: [], early: [] }, of = name && ` of ${name}`;
+    for (const { name, announced, errors: { wrong, early } } of this.tracks) {
       lanes.push([`announced${name && ` by ${name}`}`, ["type", announced]]);
-      if (this.truth.length) lanes.push([`error${of}; low: not yet announced`, ["early", early], ["wrong", wrong]]);
-    });
+      if (this.truth.length) lanes.push([`error${name && ` of ${name}`}; low: not yet announced`, ["early", early], ["wrong", wrong]]);
+    }
     const [{ name, segments, health }] = this.tracks, of = name && ` of ${name}`;
     return [...lanes, [`segments${of}`, ["type", segments]], [`health${of}, where it is not ok`, ["trouble", health]]];
   }
@@ -243,12 +241,8 @@ export class Timeline {
     this.#wide = wide;
     if (canvas.style.height !== `${high}px`) canvas.style.height = `${high}px`;
     if (!wide) return;
-    const dense = devicePixelRatio || 1, [across, down] = [Math.round(wide * dense), Math.round(high * dense)];
-    if (canvas.width !== across || canvas.height !== down) [canvas.width, canvas.height] = [across, down];
-    style ??= styleOf(canvas);
-    const pen = canvas.getContext("2d"), x = (us) => ((us - this.#from) / this.#span) * wide;
-    pen.setTransform(dense, 0, 0, dense, 0, 0);
-    pen.clearRect(0, 0, wide, high);
+    const pen = clearedPen(canvas), x = (us) => ((us - this.#from) / this.#span) * wide;
+    this.#colours = colours();
     pen.font = `${LETTERS}px system-ui, sans-serif`;
     pen.textBaseline = "middle";
     lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));
@@ -256,9 +250,9 @@ export class Timeline {
   }
 
   #lane(pen, x, wide, name, bars, top) {
-    pen.fillStyle = style.soft;
+    pen.fillStyle = this.#colours.soft;
     pen.fillText(name, 0, top + LABEL / 2 + 1);
-    pen.fillStyle = style.page;
+    pen.fillStyle = this.#colours.page;
     pen.fillRect(0, top + LABEL, wide, BAR);
     for (const [kind, spans] of bars) {
       let inked = -1;
@@ -274,23 +268,23 @@ export class Timeline {
 
   #bar(pen, kind, name, left, top, wide) {
     const { code = name, colour, ink } = kind === "trouble" ? {} : this.#styles.get(name) ?? {}, sign = kind === "wrong" ? "✗ " : "";
-    const fill = { wrong: style.bad, early: style.soft, trouble: name === "degraded" ? style.warn : style.bad }[kind] ?? colour;
+    const fill = { wrong: this.#colours.bad, early: this.#colours.soft, trouble: name === "degraded" ? this.#colours.warn : this.#colours.bad }[kind] ?? colour;
     const high = kind === "early" ? BAR / 3 : BAR;
-    pen.fillStyle = fill ?? style.page;
+    pen.fillStyle = fill ?? this.#colours.page;
     pen.fillRect(left, top + BAR - high, wide, high);
     if (!fill) {
-      pen.strokeStyle = style.line;
+      pen.strokeStyle = this.#colours.line;
       pen.strokeRect(left + 0.5, top + 0.5, Math.max(wide - 1, 0), BAR - 1);
     }
     const text = [name, code].map((one) => sign + one).find((one) => pen.measureText(one).width + 6 <= wide);
-    pen.fillStyle = kind !== "type" ? style.page : ink ?? style.text;
+    pen.fillStyle = kind !== "type" ? this.#colours.page : ink ?? this.#colours.text;
     if (text && kind !== "early") pen.fillText(text, left + 3, top + BAR / 2 + 1);
   }
 
   #axis(pen, x, wide, high) {
     const least = (this.#span / 1e6 / wide) * TICK, step = STEPS.find((one) => one >= least) ?? 86_400;
     const base = this.live ? -this.dated : this.first ?? 0, digits = step < 0.1 ? 2 : step < 1 ? 1 : 0;
-    pen.fillStyle = style.soft;
+    pen.fillStyle = this.#colours.soft;
     for (let tick = Math.ceil((this.#from - base) / 1e6 / step) * step; base + tick * 1e6 <= this.#from + this.#span; tick += step) {
       const left = x(base + tick * 1e6), text = this.live ? time(tick * 1e6) : clock(tick, digits);
       if (tick < 0) continue;
@@ -333,13 +327,6 @@ export class Timeline {
     this.draw();
   }
 
-  #wheel(event) {
-    event.preventDefault();
-    const { left, width } = this.canvas.getBoundingClientRect(), across = event.shiftKey ? event.deltaY : event.deltaX;
-    if (across) this.#pan((across / width) * this.#span);
-    else this.#zoom(1.002 ** event.deltaY, this.#from + ((event.clientX - left) / width) * this.#span);
-  }
-
   // One pointer drags, two pinch; one that did not move puts the cursor.
   #pointer(kind, event) {
     const { left, width } = this.canvas.getBoundingClientRect(), here = event.clientX - left, before = this.#pointers.get(event.pointerId);
@@ -366,7 +353,7 @@ export class Timeline {
   }
 
   #jump(by) {
-    const places = this.#errors.flatMap(({ wrong }) => wrong).map(({ from }) => from).sort((one, other) => one - other), at = this.at ?? this.last;
+    const places = this.tracks.flatMap(({ errors: { wrong } }) => wrong).map(({ from }) => from).sort((one, other) => one - other), at = this.at ?? this.last;
     const next = by > 0 ? places.find((from) => from > at) : places.findLast((from) => from < at);
     if (next !== undefined) this.seek(next);
   }
@@ -397,8 +384,3 @@ export class Timeline {
 }
 
 const time = (unixUs) => new Date(unixUs / 1000).toTimeString().slice(0, 8);
-
-function styleOf(element) {
-  const css = getComputedStyle(element), names = ["text", "soft", "page", "line", "warn", "bad"];
-  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).trim()]));
-}

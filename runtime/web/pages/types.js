@@ -1,4 +1,5 @@
 // A colour and a short code for each type, the same on all pages.
+import { make } from "./wire.js";
 
 // Okabe and Ito's colours, which colour-blind people can distinguish, and darker and paler ones for further types.
 const COLOURS = [
@@ -32,21 +33,15 @@ export function typeStyles(names) {
 
 /** Return an element that shows a type's code on its colour, for a place next to its name. */
 export function chip({ code, colour, ink }) {
-  const made = document.createElement("span");
-  made.className = "chip";
-  made.setAttribute("aria-hidden", "true");
-  made.textContent = code;
-  if (colour) [made.style.background, made.style.color] = [colour, ink];
-  return made;
+  const element = make("span", { class: "chip", "aria-hidden": "true" }, code);
+  if (colour) [element.style.background, element.style.color] = [colour, ink];
+  return element;
 }
 
 /** Return an element with the code of a type, and its name where that differs. */
 export function tag(styles, name) {
-  const made = document.createElement("span"), style = styles.get(name), text = document.createElement("span");
-  text.textContent = name;
-  text.className = style.code === name ? "unseen" : "";
-  made.append(chip(style), style.code === name ? "" : " ", text);
-  return made;
+  const style = styles.get(name), same = style.code === name;
+  return make("span", {}, chip(style), same ? "" : " ", make("span", { class: same ? "unseen" : "" }, name));
 }
 
 // The best first: a short name itself, the initials of several words, two letters, three, a letter with a number.

@@ -1,10 +1,9 @@
 // The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
-import { counted, State } from "./state.js";
+import { State } from "./state.js";
 import { chip, typeStyles } from "./types.js";
-import { cell, list, say } from "./wire.js";
+import { $, fillTable, list, make, say, tell } from "./wire.js";
 
-const $ = (id) => document.getElementById(id);
 const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
 const SETTLED_MS = 1000; // a text must be stable this long before it is read out
 const QUIET_MS = 3000; // minimum time between two texts
@@ -21,15 +20,10 @@ const HEALTHS = {
 
 export class View {
   constructor() {
-    this.live = true;
     this.state = new State((old) => this.#aged(old));
     this.frame = null;
     this.shown = null;
     this.drawing = null;
-    this.hand = null;
-    this.bits = new Map();
-    this.closed = [];
-    this.joints = [];
     this.rows = new Map();
     this.quarantined = [];
     this.words = 0;
@@ -40,17 +34,18 @@ export class View {
 
   /** Take the grasp types, switches and joints of the build, and whether its moments are those of a run. */
   build(build, live) {
-    this.live = this.state.live = live; // moments of a recording have no age
-    this.bits = new Map(build.switches.map((name, bit) => [name, bit]));
+    this.state.live = live;
+    this.switches = build.switches;
     this.joints = build.joints;
-    this.closed = build.switches.map(() => false);
-    this.rows.clear();
-    $("types").replaceChildren();
     const styles = typeStyles(build.grasps);
-    for (const grasp of build.grasps) this.#row(grasp, styles.get(grasp));
+    this.rows = new Map(build.grasps.map((grasp) => {
+      const full = make("span"), share = make("span", { class: "share" }), bar = make("div", { class: "bar" }, full);
+      const row = make("li", {}, chip(styles.get(grasp)), make("span", { class: "name" }, grasp), bar, share);
+      return [grasp, { row, full, share }];
+    }));
+    $("types").replaceChildren(...[...this.rows.values()].map(({ row }) => row));
     $("preshape").hidden = !build.preshapes;
     $("empty-hand").hidden = build.empty_hand;
-    this.classes = build.grasps;
   }
 
   /** Take the positions of the build's inputs on the hand. */
@@ -64,24 +59,20 @@ export class View {
     this.frame = frame;
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     const age = ages.length ? Math.min(...ages) : null;
-    if (this.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
+    if (this.state.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
     this.#later();
   }
 
   /** Take the health of devices and inputs. */
   health(report) {
-    const rows = report.devices.map((device) => {
-      const row = document.createElement("tr");
-      const state = device.error || (device.connected ? "connected" : "not connected");
-      const counted = device.counts.filter((count) => count.value).map((count) => `${count.name} ${count.value}`);
-      row.append(cell("th", device.name), cell("td", state), cell("td", counted.join(", ") || "nothing"));
-      return row;
-    });
-    $("devices").replaceChildren(...rows);
+    fillTable("devices", ["Device", "State", "Counted"], report.devices.map(({ name, error, connected, counts }) => {
+      const counted = counts.filter(({ value }) => value).map((count) => `${count.name} ${count.value}`);
+      return [name, error || (connected ? "connected" : "not connected"), counted.join(", ") || "nothing"];
+    }));
     this.quarantined = report.quarantined.map(({ name, reason, used }) =>
       `${name}: ${reason}, ${used ? "still used" : "treated as lost"}`,
     );
-    this.rates = `${report.switch_hz.toFixed(0)}/s switches, ${report.glove_hz.toFixed(0)}/s glove`;
+    say($("read"), `${report.switch_hz.toFixed(0)}/s switches, ${report.glove_hz.toFixed(0)}/s glove`);
     this.#wrong();
   }
 
@@ -102,21 +93,6 @@ export class View {
   #title() {
     const words = this.state.old ? "no data" : this.frame?.grasp;
     document.title = words ? `${words} · thenar` : "thenar";
-  }
-
-  #row(grasp, style) {
-    const row = document.createElement("li"), bar = document.createElement("div"), full = document.createElement("span");
-    const [name, share] = ["name", "share"].map((kind) => {
-      const part = document.createElement("span");
-      part.className = kind;
-      return part;
-    });
-    name.textContent = grasp;
-    bar.className = "bar";
-    bar.append(full);
-    row.append(chip(style), name, bar, share);
-    $("types").append(row);
-    this.rows.set(grasp, { row, full, share });
   }
 
   #later() {
@@ -148,23 +124,22 @@ export class View {
     grasp.classList.toggle("unsure", frame.grasp === "unknown");
     const health = this.state.old ? "no data" : frame.health, [is, means] = HEALTHS[health] ?? ["bad", ""];
     $("health").dataset.is = is;
-    say($("health"), health);
+    tell("health", health);
     say($("why"), means);
   }
 
   #hand(frame) {
     if (!this.drawing) return;
-    const lost = new Set(frame.lost), gone = [];
-    for (const [name, bit] of this.bits) {
-      gone[bit] = lost.has(name);
-      this.closed[bit] = !gone[bit] && frame.closed[bit] === "1";
+    const lost = new Set(frame.lost), gone = this.switches.map((name) => lost.has(name));
+    const closed = gone.map((missing, bit) => !missing && frame.closed[bit] === "1");
+    if (this.switches.length) {
+      const names = this.switches.filter((_, bit) => closed[bit]);
+      const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
+      const lacking = gone.filter(Boolean).length, readable = lacking ? "readable " : "", besides = lacking ? `; ${lacking} lost` : "";
+      const said = `${names.length} of ${this.switches.length - lacking} ${readable}switches closed${besides}`;
+      say($("hand-says"), `${said}${names.length ? ": " : ""}${names.slice(0, SHOWN).join(", ")}${more}`);
     }
-    if (this.bits.size) {
-      const names = [...this.bits].filter(([, bit]) => this.closed[bit]).map(([name]) => name);
-      const said = counted(names.length, this.bits.size, gone.filter(Boolean).length, "switches closed");
-      say($("hand-says"), `${said}${listed(names)}`);
-    }
-    this.drawing.setClosed(this.closed, gone);
+    this.drawing.setClosed(closed, gone);
     this.drawing.setPose((frame.joints ?? this.joints.map(() => null)).map((value, at) => (lost.has(this.joints[at]) ? null : value)));
     this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
   }
@@ -173,8 +148,8 @@ export class View {
     clearTimeout(this.later);
     this.later = null;
     this.words = performance.now();
-    for (const [grasp, { row, full, share }] of this.rows) {
-      const value = frame.probabilities?.[this.classes.indexOf(grasp)] ?? (grasp === frame.grasp ? frame.probability : null);
+    for (const [at, [grasp, { row, full, share }]] of [...this.rows].entries()) {
+      const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
       full.style.transform = `scaleX(${value ?? 0})`;
       if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
       else row.removeAttribute("aria-current");
@@ -184,12 +159,10 @@ export class View {
     const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
     if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
-    pairs($("times"), {
-      "latency": ms(frame.latency_us),
-      "switches, age": ms(frame.switch_age_us),
-      "glove, age": ms(frame.glove_age_us),
-      ...(this.rates ? { "read": this.rates } : {}),
-    });
+    for (const id of ["latency", "switch_age", "glove_age"]) {
+      const us = frame[`${id}_us`] ?? null;
+      say($(id), us === null ? "none yet" : `${(us / 1000).toFixed(1)} ms`);
+    }
     this.#wrong();
   }
 
@@ -210,21 +183,4 @@ export class View {
       say($("spoken"), grasp);
     }
   }
-}
-
-const ms = (us) => (us === null || us === undefined ? "none yet" : `${(us / 1000).toFixed(1)} ms`);
-
-function listed(names) {
-  if (!names.length) return "";
-  const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
-  return `: ${names.slice(0, SHOWN).join(", ")}${more}`;
-}
-
-function pairs(element, values) {
-  Object.entries(values).forEach(([name, value], at) => {
-    const pair = element.children[at] ?? element.appendChild(document.createElement("div"));
-    if (!pair.children.length) pair.append(cell("dt", name), cell("dd", value));
-    say(pair.children[0], name);
-    say(pair.children[1], value);
-  });
 }

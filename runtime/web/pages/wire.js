@@ -1,31 +1,32 @@
-// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically. And texts on the page.
+// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically. And parts of the page.
 
 const FIRST_MS = 250;
 const LONGEST_MS = 5000;
+const DARK = "(prefers-color-scheme: dark)";
 
 /**
  * Connect to the server of this page.
- * @param {Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection itself;
- * the server sends these topics
+ * @param {...Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection
+ * itself; the server sends these topics
  * @returns {function(object): boolean} send({do: ..., ...}), which returns false while there is no connection
  */
-export function connect(handlers) {
+export function connect(...handlers) {
   let socket = null;
   let wait = FIRST_MS;
 
+  const topics = new Set(handlers.flatMap(Object.keys));
+  const take = (message) => handlers.forEach((some) => some[message.topic]?.(message));
+
   function open() {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    socket = new WebSocket(`${scheme}//${location.host}/live?topics=${Object.keys(handlers)}`);
+    socket = new WebSocket(`${scheme}//${location.host}/live?topics=${[...topics]}`);
     socket.addEventListener("open", () => {
       wait = FIRST_MS;
-      handlers.open?.({});
+      take({ topic: "open" });
     });
-    socket.addEventListener("message", (event) => {
-      const message = JSON.parse(event.data);
-      handlers[message.topic]?.(message);
-    });
+    socket.addEventListener("message", (event) => take(JSON.parse(event.data)));
     socket.addEventListener("close", () => {
-      handlers.closed?.({});
+      take({ topic: "closed" });
       setTimeout(open, wait);
       wait = Math.min(2 * wait, LONGEST_MS);
     });
@@ -39,24 +40,91 @@ export function connect(handlers) {
   };
 }
 
+export const $ = (id) => document.getElementById(id);
+
+/** Return a new element with these properties or attributes, and texts and elements in it. */
+export function make(kind, settings = {}, ...children) {
+  const element = document.createElement(kind);
+  for (const [name, value] of Object.entries(settings)) {
+    if (name in element) element[name] = value;
+    else element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+/** Return a button. */
+export function button(text, onclick, settings = {}) {
+  return make("button", { type: "button", onclick, ...settings }, text);
+}
+
+/** Return a box to tick: its label, whose `control` is the box. */
+export function box(text, onchange, settings = {}) {
+  return make("label", {}, make("input", { type: "checkbox", onchange, ...settings }), text);
+}
+
 /** Set the text of an element if it differs: unchanged text is not read out again. */
 export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** Return a cell of a table: "td", or "th" for the head of its row. */
-export function cell(kind, text) {
-  const made = document.createElement(kind);
-  if (kind === "th") made.scope = "row";
-  made.textContent = text;
-  return made;
+/** Say something in the element with this id, which is there only while there is something to say. */
+export function tell(id, text) {
+  $(id).hidden = !text;
+  say($(id), text || "");
 }
 
 /** Fill a list, changing only the entries that differ. */
 export function list(element, texts) {
   while (element.children.length > texts.length) element.lastChild.remove();
-  texts.forEach((text, at) => {
-    const item = element.children[at] ?? element.appendChild(document.createElement("li"));
-    say(item, text);
+  texts.forEach((text, at) => say(element.children[at] ?? element.appendChild(make("li")), text));
+}
+
+/**
+ * Make the table in the element with the id "<id>-table": its heads, and a body with this id, whose rows are texts and
+ * elements, of which the first is the head of its row.
+ */
+export function fillTable(id, titles, rows) {
+  const heads = titles.map((title) => (title === "" ? make("td") : make("th", { scope: "col" }, title)));
+  const lines = rows.map(([title, ...rest]) => {
+    return make("tr", {}, make("th", { scope: "row" }, title), ...rest.map((one) => make("td", {}, one)));
   });
+  $(`${id}-table`).replaceChildren(make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", { id }, ...lines)));
+}
+
+/**
+ * Fill a menu with members {id, name}: what was chosen stays if it is still there, or else it is `usual`. A menu in a
+ * label is not shown without members.
+ */
+export function fillMenu(menu, members, usual = "") {
+  const before = menu.options.length ? menu.value : usual, ids = members.map(({ id }) => id);
+  const options = members.map(({ id, name }) => new Option(name, id));
+  const words = (some) => some.map(({ value, text }) => `${value} ${text}`).join("\n");
+  // A menu that is open stays open.
+  if (words(options) !== words([...menu.options])) menu.replaceChildren(...options);
+  menu.value = ids.includes(before) ? before : usual;
+  if (menu.parentElement.matches("label")) menu.parentElement.hidden = !members.length;
+}
+
+/** Return the pen of a canvas, which is made as large as it is shown, and cleared: its unit is a pixel of the page. */
+export function clearedPen(canvas) {
+  const pen = canvas.getContext("2d");
+  const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
+  if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+  pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+  pen.clearRect(0, 0, wide, high);
+  return pen;
+}
+
+/** Return the page's colours by their names: of each its style has one for light pages and one for dark ones. */
+export function colours() {
+  const css = getComputedStyle(document.body), at = matchMedia(DARK).matches ? 1 : 0;
+  const names = ["text", "soft", "page", "line", "warn", "bad"];
+  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).match(/#\w+/g)[at]]));
+}
+
+/** Let a canvas be drawn anew when its size or the page's colours change. */
+export function redraw(canvas, paint) {
+  new ResizeObserver(paint).observe(canvas);
+  matchMedia(DARK).addEventListener("change", paint);
 }
