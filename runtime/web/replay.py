@@ -176,7 +176,7 @@ class Replay(Closing):
         except OSError as wrong:
             self._faults.append(f"{path.name} is shown up to here: {wrong.strerror}")
         self._faults += [fault.message for fault in self._reader.faults()]
-        if max(map(len, (*self._changes, self._truth))) == _MOST_CHANGES:
+        if max(len(self._truth), *map(len, self._changes)) == _MOST_CHANGES:
             self._faults.append(f"the timeline ends at {_MOST_CHANGES} changes of the prediction, or labels")
         self._scanned.set()
 
