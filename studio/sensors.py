@@ -78,7 +78,7 @@ class GloveSensors:
         return shown
 
     def drawn(self, shown: Sequence[int | None]) -> dict[str, object]:
-        """Return the state of the drawn hand: `closed`, `lost`, `pressed` from 0 to 1, and `values` of the joints."""
+        """Return the drawn hand: `closed` and `lost` by bit, `pressed` from 0 to 1, `values` of the joints."""
         first, last = self._switches, self._switches + len(self._pads)
         return {
             "closed": [value == 1 for value in shown[:first]] + [False] * len(self._pads),
