@@ -1,5 +1,7 @@
 """`open_studio`: the studio with all its pages."""
 
+from thenar.drivers.extras import optional
+
 from .choose import ChoosePage
 from .compare import add_compare_page
 from .errors import ErrorsPage
@@ -9,6 +11,9 @@ from .project import Project
 from .record import RecordPage
 from .studio import Studio
 from .wearer import WearerPage
+
+with optional():  # trainers would miss it later
+    import sklearn  # noqa: F401
 
 
 def open_studio(project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose") -> Studio:
