@@ -5,7 +5,6 @@ Like a collection, it is led by a view, the terminal or a page, and needs no tra
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from threading import Event
 from time import monotonic
@@ -75,9 +74,12 @@ def lead_poses(
     DeviceError, SettingError
         If the glove is not there, or sends no joints.
     """
-    with _posing(port, baud, hold_s, note) as (guide, take):
+    with _rows(port, baud, note) as (names, old_us, read):
+        guide = PoseGuide(names, round(hold_s * 1e6), old_us)
         while guide.stage != "done" and not stop.is_set():
-            take()
+            raw = read()
+            if raw is not None:
+                guide.take(now_us(), raw)
             for key in view(guide):
                 guide.press(now_us(), key)
         return guide if guide.stage == "done" else None
@@ -160,46 +162,40 @@ def _await(sources: Sources, read: Callable[[], Any], what: str) -> None:
 
 
 @contextmanager
-def _posing(
-    port: str, baud: int, hold_s: float, note: Callable[[str], None]
-) -> Iterator[tuple[PoseGuide, Callable[[], None]]]:
-    """Yield a guide through the poses of a CyberGlove, or of the stream of a glove.toml, and a function that waits for
-    the next bytes and passes them to it.
+def _rows(
+    port: str, baud: int, note: Callable[[str], None]
+) -> Iterator[tuple[tuple[str, ...], int, Callable[[], bytes | None]]]:
+    """Yield the names of the joints of a CyberGlove, or of the stream of a glove.toml, the age from which a row of
+    their bytes is old, and a function that waits for the next row; None: none came yet.
     """
+    names = tuple[str, ...]()
+    if port.endswith(".toml"):
+        wired = load_harness(port).cyberglove
+        if wired is None:
+            with _sources(Path(port), taxels=False) as (harness, sources):
 
-    def take(read: Callable[[], bytes | None], guide: PoseGuide) -> None:
-        raw = read()
-        if raw is not None:
-            guide.take(now_us(), raw)
+                def newest() -> bytes | None:
+                    """Return the newest row that measures every joint."""
+                    arrived = sources.take(WAIT_US).arrived
+                    rows = [frame.sensors for frame in arrived if isinstance(frame, GloveFrame)]
+                    return next((row for row in reversed(rows) if 0 not in row), None)
 
-    def row() -> bytes | None:
-        """Return the newest row that measures every joint."""
-        arrived = sources.take(WAIT_US).arrived
-        whole = [frame.sensors for frame in arrived if isinstance(frame, GloveFrame) and 0 not in frame.sensors]
-        return whole[-1] if whole else None
+                _await(sources, newest, "joints")
+                yield harness.sensor_names, old_after_us(sources.glove_period_us), newest
+            return
+        port, baud, names = wired.port, wired.baud, wired.joints
+    glove = CyberGlove(port, baud=baud)
 
-    def record() -> bytes | None:
+    def read() -> bytes | None:
         timed = glove.read(_WAIT_S)
         if timed is not None and timed[1].fault == "unplugged":
             raise DeviceError(f"{port}: the glove is not plugged into its box")
         return None if timed is None else timed[1].sensors
 
-    hold_us, names = round(hold_s * 1e6), tuple[str, ...]()
-    if port.endswith(".toml"):
-        wired = load_harness(port).cyberglove
-        if wired is None:
-            with _sources(Path(port), taxels=False) as (harness, sources):
-                _await(sources, row, "joints")
-                guide = PoseGuide(harness.sensor_names, hold_us, old_after_us(sources.glove_period_us))
-                yield guide, partial(take, row, guide)
-            return
-        port, baud, names = wired.port, wired.baud, wired.joints
-    glove = CyberGlove(port, baud=baud)
     try:
         info = glove.open()
         for sentence in info.notes:
             note(sentence)
-        guide = PoseGuide(names or info.names, hold_us, old_after_us(None))
-        yield guide, partial(take, record, guide)
+        yield names or info.names, old_after_us(None), read
     finally:
         glove.close()

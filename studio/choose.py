@@ -16,7 +16,6 @@ import numpy as np
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
-from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.hand import HandShape, moved_by
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.elements import elements_of, names_of
@@ -24,15 +23,12 @@ from thenar.compiler.recordings.edits import TrialId
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.errors import HarnessError
 from thenar.runtime.hand import DrawnJoint, DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.timing import scan_us
 from thenar.runtime.web.server import message
 
 from .quick import QuickAccuracy
-from .sensors import placed
+from .sensors import placed, scan_time_us
 from .studio import Asked, Handler, Report, Studio
 
 _BUILD = "build"
@@ -136,7 +132,7 @@ class ChoosePage:
             "quick",
             self.known.of(sensors),
             sensors=sensors,
-            scan_us=self._scan_us(names),
+            scan_us=scan_time_us([self._levels[name] for name in names if name in self._levels]),
             price=sum(self._prices[name] for name in names) if self._prices else None,
             command=self._command(names),
         )
@@ -149,17 +145,6 @@ class ChoosePage:
         have, more = quote(",".join(names)), "".join(f" {quote(option)}" for option in self._project.options())
         output = quote(str(self._project.new_path(_BUILD)))
         return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
-
-    def _scan_us(self, names: Sequence[str]) -> float | None:
-        """Return the time on the wire of a scan of the switches and pads in `names`, on the chips that are proposed;
-        None if one bus has no room for them.
-        """
-        read = [self._levels[name] for name in names if name in self._levels]
-        try:
-            harness = propose_harness(read)
-        except HarnessError:
-            return None
-        return scan_us(whole_scan(harness, read), harness).us if read else 0.0
 
     def _levels_of(self) -> dict[str, str]:
         """Return the element that a switch or a pad is read as, by its name: itself, or a level."""

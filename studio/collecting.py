@@ -14,7 +14,7 @@ from thenar.compiler.recordings.taxonomy import MOVEMENTS, Taxonomy
 from thenar.drivers.errors import DeviceError, SettingError, ThenarError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.frames import SwitchFrame, now_us, old_after_us
+from thenar.runtime.frames import now_us, old_after_us
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live.sources import NOT_YET, Sources
 from thenar.runtime.names import list_names, of_device
@@ -87,8 +87,10 @@ def collect(
         taxels=harness.taxel_names,
         taxel_calibration=calibration_of(harness.taxel_settings),
     )
-    if journal is not None:
-        _check_same_glove(journal, session)
+    for name in ("switches", "sensors", "calibration", "taxels", "taxel_calibration"):
+        if journal is not None and getattr(journal.session, name) != getattr(session, name):
+            what = name.replace("_", " ")
+            raise SettingError(f"{journal.path} was begun with different {what}: begin another recording")
     with Sources(harness, switches, whole_scan(harness, switches, every_taxel=True)) as sources:
         _meet(sources, len(switches), stop)
         if stop.is_set():
@@ -160,16 +162,7 @@ def _meet(sources: Sources, switches: int, stop: Event) -> None:
             names = list_names([device.name for device in sources.devices()])
             raise DeviceError(f"{names}: nothing came in {_PATIENCE_US // 1_000_000} s; nothing is recorded")
         taken = sources.take(WAIT_US)
-        read = read or taken.glove is not None or (taken.switches is not None and _is_read(taken.switches, switches))
-
-
-def _is_read(frame: SwitchFrame, switches: int) -> bool:
-    """Return whether the frame holds a known switch, out of `switches`, or a readable taxel."""
-    return bool((1 << switches) - 1 & ~frame.lost) or any(code is not None for code in frame.taxels or ())
-
-
-def _check_same_glove(journal: Journal, session: Session) -> None:
-    for name in ("switches", "sensors", "calibration", "taxels", "taxel_calibration"):
-        if getattr(journal.session, name) != getattr(session, name):
-            what = name.replace("_", " ")
-            raise SettingError(f"{journal.path} was begun with different {what}: begin another recording")
+        frame, read = taken.switches, read or taken.glove is not None
+        if frame is not None:
+            # A known switch, or a taxel that can be read.
+            read |= bool((1 << switches) - 1 & ~frame.lost) or any(code is not None for code in frame.taxels or ())

@@ -12,18 +12,14 @@ from thenar.compiler.artifact.documents import REPORT_NAME, report_of_build
 from thenar.compiler.facts import SensorCount
 from thenar.compiler.firmware.generate import firmware_files, write_folder
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.glove.propose import propose_harness
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import TABLES_NAME, Build
-from thenar.runtime.errors import HarnessError
 from thenar.runtime.files import write_atomically
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.scanning.plan import plan_scan
-from thenar.runtime.scanning.timing import scan_us
 from thenar.runtime.web.server import message
 
 from .choose import drawn
 from .project import Project
+from .sensors import scan_time_us, sensors_read
 from .studio import Asked, Handler, Report, Studio
 
 
@@ -63,7 +59,7 @@ def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Se
     project, builds = studio.project, [Build.load(path) for path in paths]
     grasp_set, _, unused = project.recordings(sets)
     found = compare_builds(paths[0], paths[1], grasp_set, report)
-    kept = [_sensors(build.manifest) for build in builds]
+    kept = [sensors_read(build.manifest) for build in builds]
     prices = {name: part.price for name, part in project.parts(list({**kept[0], **kept[1]})).items()}
     shown = [
         {
@@ -71,7 +67,7 @@ def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Se
             "right": right,
             "ends": ends,
             "sensors": str(SensorCount.of_build(build.manifest)),
-            "scan_us": _scan_us(project, build.manifest),
+            "scan_us": scan_time_us([switch.name for switch in build.manifest.switches], project),
             "bytes": (path / TABLES_NAME).stat().st_size,
             "price": sum(prices[name] for name in names) if prices else None,
             "stated": str(build.manifest.headline or "not measured"),
@@ -88,24 +84,6 @@ def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Se
         "unused": unused,
     }
     studio.publish("compare", message("compare", about, ids=ids))
-
-
-def _sensors(manifest: Manifest) -> dict[str, None]:
-    """Return the names of the switches, pads and joints that a build reads, each once."""
-    return dict.fromkeys([switch.source for switch in manifest.switches] + [joint.name for joint in manifest.joints])
-
-
-def _scan_us(project: Project, manifest: Manifest) -> float | None:
-    """Return the time of a scan of a build's switches and pads, on the project's harness or on a proposed one; None if
-    that does not read them.
-    """
-    names = [switch.name for switch in manifest.switches]
-    try:
-        harness = project.wiring() if project.harness.exists() else propose_harness(names)
-        scan = plan_scan(names, harness)
-    except HarnessError:
-        return None
-    return scan_us(scan, harness).us if scan.ports else 0.0
 
 
 def _said(found: BuildComparison, a: str, b: str) -> str:

@@ -21,6 +21,7 @@ from thenar.runtime.web.server import message
 from .choose import ChoosePage
 from .edits import change, last_action, load_edits, undo
 from .quick import QuickAccuracy, strongest
+from .sensors import sensors_read
 from .studio import Asked, Handler, Report, Studio
 
 # The most trials that a page is sent at a time.
@@ -67,8 +68,7 @@ class BuildReading:
         rate = Rate.predicted(numbers[rows], quick.truth[quick.trial], quick.trial, of="pooled", groups=people)
         known = int(np.count_nonzero(trained_on(build.manifest, quick.held)))
         of = f"{known} of these {len(quick.truth)} trials trained it" if known else "none of these trials trained it"
-        read = [*(one.source for one in build.manifest.switches), *(joint.name for joint in build.manifest.joints)]
-        self.sensors = tuple(sorted({quick.names.index(one) for one in read}))
+        self.sensors = tuple(sorted(quick.names.index(name) for name in sensors_read(build.manifest)))
         self._usual = dict[int, NDArray[np.float64]]()
         self.about = {"of": f"build {name}; {of}", "mean": rate.mean, "low": rate.low, "high": rate.high}
 

@@ -132,7 +132,8 @@ class GlovePage:
         sensors = self._sensors()
         harness, kinds = self._project.wiring(), sensors.kinds
         past = self._past = [deque[tuple[float, int | None]](maxlen=_MOST_KEPT) for _ in kinds]
-        last, changes, before = [*map(_nothing, kinds)], [0 for _ in kinds], [0 for _ in kinds]
+        last: list[int | None] = [None] * len(kinds)
+        changes, before = [0] * len(kinds), [0] * len(kinds)
         moved = dict.fromkeys(_LEAST_CHANGE, 0)
         came, rates = {"switches and pads": 0, "joints": 0}, dict[str, float]()
         shown_s = rated_s = monotonic()
@@ -267,10 +268,6 @@ class GlovePage:
         said += f"; {list_names(lacking)} did not move" if lacking else ""
         self._studio.publish("calibrated", message("calibrated", said=said))
         self._studio.changed()
-
-
-def _nothing(_: str) -> int | None:
-    return None
 
 
 def _state(value: int | None, kind: str, changes: int, others: int) -> str:

@@ -101,7 +101,9 @@ class QuickAccuracy:
     def of(self, sensors: Sequence[int]) -> Quick:
         """Return the accuracy of sensors by their numbers. Raises EvaluationError if there is no such number."""
         columns = self._columns(sensors)
-        rows, predicted = self._samples, self._all_predicted(columns)
+        rows, predicted = self._samples, np.empty(len(self._samples.labels), np.intp)
+        for fold in self._folds:
+            predicted[fold.test] = self._predicted(fold, columns, fold.test)
         rate = Rate.predicted(predicted, rows.labels, rows.trials, of=self._cut.of, groups=self._cut.groups)
         read = decided(predicted[np.newaxis], self.trial)[0]
         confusion = np.zeros((len(self.grasps), len(self.grasps)), np.intp)
@@ -196,8 +198,7 @@ class QuickAccuracy:
         places = np.zeros((len(self.truth), 2))
         if not columns:
             return places
-        inputs = self._inputs[:, columns]
-        means = self._every.means[:, columns]
+        inputs, means = self._inputs[:, columns], self._every.means[:, columns]
         # Where the types' rows are equally wide in all directions, their means are furthest apart on the main axes.
         width, turn = np.linalg.eigh(_shrunk(self._every.scatter[columns][:, columns]))
         whitened = turn / np.sqrt(width)
@@ -214,12 +215,6 @@ class QuickAccuracy:
         labels, step = self._samples.labels, -(-len(self._samples.labels) // _MOST_TRIED)
         several = ((fold, fold.test[::step]) for fold in self._folds)
         return sum(int((self._predicted(fold, columns, rows) == labels[rows]).sum()) for fold, rows in several)
-
-    def _all_predicted(self, columns: list[int]) -> NDArray[np.intp]:
-        predicted = np.empty(len(self._samples.labels), np.intp)
-        for fold in self._folds:
-            predicted[fold.test] = self._predicted(fold, columns, fold.test)
-        return predicted
 
     @staticmethod
     def _weights(fold: _Sums, columns: list[int]) -> Floats:

@@ -4,12 +4,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.hand import HandShape, grid_places, moved_by, places_of, shape_of, unknown_shape
 from thenar.runtime.calibration import load_calibration, numbers_of
+from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.hand import DrawnJoint, DrawnSwitch, DrawnTaxel, HandDrawing
 from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.timing import scan_us
 from thenar.runtime.taxels import calibration_of
+
+from .project import Project
 
 
 class GloveSensors:
@@ -95,6 +102,23 @@ class GloveSensors:
 
     def _value(self, name: str, byte: int) -> float:
         return round(self._lines[name].value(byte), 3) if name in self._lines else float(byte)
+
+
+def sensors_read(manifest: Manifest) -> dict[str, None]:
+    """Return the names of the switches, pads and joints that a build reads, each once."""
+    return dict.fromkeys([switch.source for switch in manifest.switches] + [joint.name for joint in manifest.joints])
+
+
+def scan_time_us(elements: Sequence[str], project: Project | None = None) -> float | None:
+    """Return the time on the wire of a scan of switches and pads, on the harness of a project, or on the chips that are
+    proposed if it has none; None if that does not read them.
+    """
+    try:
+        harness = project.wiring() if project is not None and project.harness.exists() else propose_harness(elements)
+        scan = plan_scan(elements, harness)
+    except HarnessError:
+        return None
+    return scan_us(scan, harness).us if scan.ports else 0.0
 
 
 def placed(names: Sequence[str], hand: HandShape | None) -> tuple[dict[str, tuple[float, float]], dict[str, Any]]:
