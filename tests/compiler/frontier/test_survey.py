@@ -149,14 +149,6 @@ def test_every_fold_tests_rows_that_it_does_not_train_on() -> None:
             assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(len(grasp_set)))
 
 
-def test_no_trial_is_parted() -> None:
-    grasp_set = frames_of(make_set(subjects=2), 5)
-    cuts = cuts_of(grasp_set)
-    assert (len(cuts.trials), len(cuts.people)) == (480, 96)
-    for fold in (*cuts.screening, *cuts.others):
-        assert set(cuts.trials[fold.train]).isdisjoint(cuts.trials[fold.test])
-
-
 def test_a_trial_is_recognised_as_most_of_its_frames_are() -> None:
     """Counted here once more: each row's answer, and the label that most frames of a trial are given."""
     grasp_set = make_set(rows=288, subjects=3)
