@@ -119,12 +119,6 @@ def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables: MakeTables, s
     assert np.abs(np.cumsum(np.array(order, np.int64), axis=0)).max() <= tables.bound
 
 
-def test_the_bound_is_reached() -> None:
-    one = np.ones((1, 2), np.int16)
-    tables = IntegerTables.of(7 * one[0], 5 * one, (np.array([], np.uint16),), (3 * one,), one, one, 1.0)
-    assert tables.bound == 15
-
-
 def test_a_tampered_table_that_could_overflow_is_refused(make_tables: MakeTables) -> None:
     tables = make_tables()
     payload = _payload(tables)
