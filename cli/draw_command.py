@@ -48,9 +48,10 @@ def command(
         raise click.UsageError("--kept draws the glove itself: leave GRASPS out")
     for source in (grasps, layout, *kept):
         keep_apart(source, output)
-    from thenar.compiler.placement.kept import kept_names
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.simulator.handmaps import draw as handpanels
+
+    from .kept import kept_names
 
     hand = hand_of(layout)
     if grasps is not None:

@@ -9,39 +9,54 @@ from typing import TYPE_CHECKING, Any
 from thenar.drivers.extras import optional
 
 if TYPE_CHECKING:
-    from thenar.drivers.errors import ThenarError
-    from thenar.runtime.build import Build
-    from thenar.runtime.model.tables import ScoreTables
-    from thenar.runtime.model.terms.base import Term
-    from thenar.runtime.model.terms.bins import Bins
-    from thenar.runtime.model.terms.bit import Bit
-    from thenar.runtime.model.terms.grid import Grid
-    from thenar.runtime.model.terms.line import Line
-    from thenar.runtime.recipe import Recipe
+    from thenar.drivers.errors import ThenarError as ThenarError
+    from thenar.runtime.build import Build as Build
+    from thenar.runtime.model.tables import ScoreTables as ScoreTables
+    from thenar.runtime.model.terms.base import Term as Term
+    from thenar.runtime.model.terms.bins import Bins as Bins
+    from thenar.runtime.model.terms.bit import Bit as Bit
+    from thenar.runtime.model.terms.grid import Grid as Grid
+    from thenar.runtime.model.terms.line import Line as Line
+    from thenar.runtime.recipe import Recipe as Recipe
 
-    from .artifact import CompileError
-    from .artifact.adapting import AdaptedBuild, adapt
-    from .artifact.comparing import BuildComparison, compare_builds
-    from .artifact.compile import compile_build
-    from .artifact.documents import BuildReport, Documents
-    from .artifact.exporting import export_c
-    from .artifact.verify import FaultCheck, Verification, verify, verify_faults
-    from .classifiers import LogitBoostClassifier
-    from .evaluation.folds import EvaluationError
-    from .evaluation.study import Study, StudyDesign, evaluate
-    from .firmware.targets import TARGETS
-    from .frontier.find import find_frontier
-    from .frontier.points import Frontier
-    from .frontier.search import Search
-    from .placement.methods.base import METHODS
-    from .placement.placement import Placement, place
-    from .placement.tree import grow_id3
-    from .recordings.columns import ColumnRoles
-    from .recordings.export import from_dataframe, to_dataframe
-    from .recordings.graspset import GraspSet, Joint
-    from .recordings.merging import merge, split
-    from .samples import Samples, TrainingError
-    from .trainers.base import TRAINERS, Setting, Trainer
+    from .artifact import CompileError as CompileError
+    from .artifact.adapting import AdaptedBuild as AdaptedBuild
+    from .artifact.adapting import adapt as adapt
+    from .artifact.comparing import BuildComparison as BuildComparison
+    from .artifact.comparing import compare_builds as compare_builds
+    from .artifact.compile import compile_build as compile_build
+    from .artifact.documents import BuildReport as BuildReport
+    from .artifact.documents import Documents as Documents
+    from .artifact.verify import FaultCheck as FaultCheck
+    from .artifact.verify import Verification as Verification
+    from .artifact.verify import verify as verify
+    from .artifact.verify import verify_faults as verify_faults
+    from .classifiers import LogitBoostClassifier as LogitBoostClassifier
+    from .evaluation.folds import EvaluationError as EvaluationError
+    from .evaluation.study import Study as Study
+    from .evaluation.study import StudyDesign as StudyDesign
+    from .evaluation.study import evaluate as evaluate
+    from .firmware.generate import export_c as export_c
+    from .firmware.targets import TARGETS as TARGETS
+    from .frontier.find import find_frontier as find_frontier
+    from .frontier.points import Frontier as Frontier
+    from .frontier.search import Search as Search
+    from .placement.methods.base import METHODS as METHODS
+    from .placement.placement import Placement as Placement
+    from .placement.placement import place as place
+    from .placement.tree import grow_id3 as grow_id3
+    from .recordings.columns import ColumnRoles as ColumnRoles
+    from .recordings.export import from_dataframe as from_dataframe
+    from .recordings.export import to_dataframe as to_dataframe
+    from .recordings.graspset import GraspSet as GraspSet
+    from .recordings.graspset import Joint as Joint
+    from .recordings.merging import merge as merge
+    from .recordings.merging import split as split
+    from .samples import Samples as Samples
+    from .samples import TrainingError as TrainingError
+    from .trainers.base import TRAINERS as TRAINERS
+    from .trainers.base import Setting as Setting
+    from .trainers.base import Trainer as Trainer
 
 _HOMES = {
     "thenar.drivers.errors": ("ThenarError",),
@@ -58,11 +73,11 @@ _HOMES = {
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
-    ".artifact.exporting": ("export_c",),
     ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
     ".classifiers": ("LogitBoostClassifier",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "StudyDesign", "evaluate"),
+    ".firmware.generate": ("export_c",),
     ".firmware.targets": ("TARGETS",),
     ".frontier.find": ("find_frontier",),
     ".frontier.points": ("Frontier",),
@@ -79,55 +94,8 @@ _HOMES = {
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
-__all__ = [
-    "METHODS",
-    "TARGETS",
-    "TRAINERS",
-    "AdaptedBuild",
-    "Bins",
-    "Bit",
-    "Build",
-    "BuildComparison",
-    "BuildReport",
-    "ColumnRoles",
-    "CompileError",
-    "Documents",
-    "EvaluationError",
-    "FaultCheck",
-    "Frontier",
-    "GraspSet",
-    "Grid",
-    "Joint",
-    "Line",
-    "LogitBoostClassifier",
-    "Placement",
-    "Recipe",
-    "Samples",
-    "ScoreTables",
-    "Search",
-    "Setting",
-    "Study",
-    "StudyDesign",
-    "Term",
-    "ThenarError",
-    "Trainer",
-    "TrainingError",
-    "Verification",
-    "adapt",
-    "compare_builds",
-    "compile_build",
-    "evaluate",
-    "export_c",
-    "find_frontier",
-    "from_dataframe",
-    "grow_id3",
-    "merge",
-    "place",
-    "split",
-    "to_dataframe",
-    "verify",
-    "verify_faults",
-]
+# Registries, then classes, then functions.
+__all__ = sorted(_HOME_OF, key=lambda name: (not name.isupper(), name.islower(), name))
 
 
 def __getattr__(name: str) -> Any:

@@ -1,6 +1,6 @@
 """The paper's trainer as a scikit-learn estimator: LogitBoost on decision stumps."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -146,7 +146,12 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
 
         The class with the largest score is predicted, the lowest number at a tie.
         """
-        return self._decided(self._scores(X))
+        scores = self._scores(X)
+        if len(self.classes_) != 2:
+            return scores
+        lead = scores[:, 1] - scores[:, 0]
+        # Tied scores, which go to the first class, have a lead of zero.
+        return np.where(np.abs(lead) <= TIE, 0.0, lead)
 
     def predict_proba(self, X: ArrayLike) -> Floats:
         """Return class probabilities (n, K), columns as in `classes_`."""
@@ -159,26 +164,9 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         labels: NDArray[Any] = self.classes_[best]
         return labels
 
-    def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
-        """Yield the scores after 1, 2, ... rounds: one training gives every number of rounds."""
-        inputs = self._inputs(X)
-        return map(self._decided, self.stumps_.staged_scores(inputs))
-
-    def _decided(self, scores: Floats) -> Floats:
-        if len(self.classes_) != 2:
-            return scores
-        lead = scores[:, 1] - scores[:, 0]
-        # Tied scores, which go to the first class, have a lead of zero.
-        return np.where(np.abs(lead) <= TIE, 0.0, lead)
-
     def _scores(self, X: ArrayLike) -> Floats:
-        inputs = self._inputs(X)
-        return self.stumps_.scores(inputs)
-
-    def _inputs(self, X: ArrayLike) -> NDArray[Any]:
         check_is_fitted(self)
-        inputs: NDArray[Any] = validate_data(self, X, reset=False, dtype=_kept_dtypes(X))
-        return inputs
+        return self.stumps_.scores(validate_data(self, X, reset=False, dtype=_kept_dtypes(X)))
 
     def _index(self, targets: NDArray[Any]) -> NDArray[np.intp]:
         matches = targets[:, np.newaxis] == self.classes_

@@ -194,12 +194,16 @@ def load_layout(path: Path) -> HandShape:
     names, places = tuple(layout.places), np.array(list(layout.places.values()), np.float64)
     parts = [part_of.get(name, _WHOLE) for name in names]
     part_names = tuple(dict.fromkeys((*layout.parts, *parts)))
+    gaps = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    np.fill_diagonal(gaps, np.inf)
+    # At which no two switches overlap.
+    most_mm = min(layout.body_mm / 2 or _LARGEST_DOT_MM, 0.45 * float(gaps.min(initial=np.inf)))
     return HandShape(
         glove=path.name,
         length_mm=None,
         names=names,
         places=places,
-        radius_mm=_radius_mm(places, layout.body_mm),
+        radius_mm=max(_SMALLEST_DOT_MM, most_mm),
         part_names=part_names,
         parts=np.array([part_names.index(part) for part in parts], np.intp),
         sides=np.zeros(len(names), np.intp),
@@ -211,14 +215,6 @@ def load_layout(path: Path) -> HandShape:
         part_number=layout.part_number,
         body_mm=layout.body_mm,
     )
-
-
-def _radius_mm(places: np.ndarray, body_mm: float) -> float:
-    """Return the radius at which no two switches overlap, at most half of body_mm if that is given."""
-    gaps = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
-    np.fill_diagonal(gaps, np.inf)
-    most = min(body_mm / 2 or _LARGEST_DOT_MM, 0.45 * float(gaps.min(initial=np.inf)))
-    return max(_SMALLEST_DOT_MM, most)
 
 
 def drawn_hand(

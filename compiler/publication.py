@@ -97,7 +97,11 @@ def publish_folder(files: Mapping[str, bytes], folder: Path, theirs: Theirs, rai
             # Report the path that the user knows, not the box.
             raise OSError(reason.errno, reason.strerror, str(folder)) from reason
         if replaced is not None and not _disposable(replaced, target, theirs):
-            _put_back(replaced, box, target)
+            if replaced == box / _OLD:
+                target.rename(box / _PART)
+                replaced.rename(target)
+            elif exchanged(replaced, target):
+                (box / _NEW).rename(box / _PART)
             theirs(target)
             raise raises(f"{folder} was changed while it was replaced: run this again")
         sync_folder(target.parent)
@@ -235,14 +239,6 @@ def _put(box: Path, target: Path) -> Path | None:
     target.rename(old)
     new.rename(target)
     return old
-
-
-def _put_back(replaced: Path, box: Path, target: Path) -> None:
-    if replaced == box / _OLD:
-        target.rename(box / _PART)
-        replaced.rename(target)
-    elif exchanged(replaced, target):
-        (box / _NEW).rename(box / _PART)
 
 
 def exchanged(one: Path, other: Path) -> bool:

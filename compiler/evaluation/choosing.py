@@ -246,7 +246,10 @@ def choose_training(
     Fitting
         Train with `Training.chosen(fitting)`.
     """
-    some = _spread(samples)
+    # Of long movements, frames at even distances.
+    rows = len(samples.labels)
+    frames = rows // len(np.unique(samples.trials))
+    some = np.arange(0, rows, max(1, min(frames // _FRAMES, -(-rows // _COMPARED))))
     samples, groups = samples.rows(some), None if groups is None else groups[some]
     folds = inner_folds(samples, seed, groups) if len(candidates) > 1 else []
     if not folds:
@@ -271,12 +274,6 @@ def choose_training(
         of = "pooled" if np.ptp(samples.subjects) else "within subject"
     finished = [candidates[one] for one in left]
     return replace(_fitting(finished, scores, clusters, samples.n_classes, of, len(folds)), tried=len(candidates))
-
-
-def _spread(samples: Samples) -> Rows:
-    rows = len(samples.labels)
-    frames = rows // len(np.unique(samples.trials))
-    return np.arange(0, rows, max(1, min(frames // _FRAMES, -(-rows // _COMPARED))))
 
 
 def _values(training: Training) -> dict[str, float | None]:

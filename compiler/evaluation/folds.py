@@ -87,7 +87,15 @@ def weka_folds(labels: ArrayLike, n_folds: int, seed: int) -> list[Fold]:
     random.shuffle(order)
     grouped = _grouped(order, labels.tolist())
     order = [row for start in range(n_folds) for row in grouped[start::n_folds]]
-    return [_cut(order, n_folds, fold, random) for fold in range(n_folds)]
+    size, larger = divmod(len(order), n_folds)
+    folds = []
+    for fold in range(n_folds):
+        start = fold * size + min(fold, larger)
+        stop = start + size + (fold < larger)
+        train = order[:start] + order[stop:]
+        random.shuffle(train)
+        folds.append(Fold(np.array(train, np.intp), np.array(order[start:stop], np.intp), str(fold + 1)))
+    return folds
 
 
 def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed: int) -> list[Fold]:
@@ -135,15 +143,6 @@ def _grouped(order: list[int], labels: Sequence[object]) -> list[int]:
     return order
 
 
-def _cut(order: list[int], n_folds: int, fold: int, random: JavaRandom) -> Fold:
-    size, larger = divmod(len(order), n_folds)
-    start = fold * size + min(fold, larger)
-    stop = start + size + (fold < larger)
-    test, order = order[start:stop], order[:start] + order[stop:]
-    random.shuffle(order)
-    return Fold(np.array(order, dtype=np.intp), np.array(test, dtype=np.intp), str(fold + 1))
-
-
 def leave_one_out(groups: NDArray[np.str_], by: str) -> list[Fold]:
     """Return one fold for each name in groups (n,): test on its rows, train on all others; in the order of names.
 
@@ -154,7 +153,7 @@ def leave_one_out(groups: NDArray[np.str_], by: str) -> list[Fold]:
         raise EvaluationError(
             f"leaving one {by} out needs two or more; all {len(groups)} rows are of {by} {', '.join(names)!r}"
         )
-    return [_fold(groups == name, name) for name in names]
+    return [Fold(np.flatnonzero(groups != name), np.flatnonzero(groups == name), name) for name in names]
 
 
 # With more groups than this, several are left out together.
@@ -167,10 +166,6 @@ def leave_groups_out(groups: NDArray[np.generic], by: str, n_folds: int = _MOST_
     if len(names) > n_folds:
         groups = number % n_folds
     return leave_one_out(groups.astype(np.str_), by)
-
-
-def _fold(tested: NDArray[np.bool_], name: str) -> Fold:
-    return Fold(np.flatnonzero(~tested), np.flatnonzero(tested), name)
 
 
 Scheme = Literal["trial", "subject", "object", "session"]

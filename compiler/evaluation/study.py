@@ -201,7 +201,12 @@ class StudyRun:
         populations = populations_of(chosen, scheme, recipe.folds, design.repeats, recipe.seed)
         reasons = {name: _why_not(name, chosen, populations, design) for name in design.tables}
         if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
-            _check_all_switches(chosen, populations)
+            # Training on all switches must fit in memory: say so before placements are chosen.
+            varying = chosen.switches.any(axis=0) & ~chosen.switches.all(axis=0)
+            wide = int(varying.sum()) + len(chosen.taxel_columns)
+            for population in populations:
+                rows = max((len(fold.train) for fold in population.folds), default=0)
+                check_memory(rows, len(population.grasps), EvaluationError, wide)
         self.names: tuple[tuple[TableName, ProtocolName], ...] = tuple(
             (name, protocol)
             for name, reason in reasons.items()
@@ -263,14 +268,6 @@ def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:
     check_types(types, EvaluationError)
     check_memory(len(chosen), types, EvaluationError)
     return chosen
-
-
-def _check_all_switches(grasp_set: GraspSet, populations: tuple[Population, ...]) -> None:
-    """Raise EvaluationError if training on all switches does not fit in memory, before placements are chosen."""
-    varying = grasp_set.switches.any(axis=0) & ~grasp_set.switches.all(axis=0)
-    for population in populations:
-        rows = max((len(fold.train) for fold in population.folds), default=0)
-        check_memory(rows, len(population.grasps), EvaluationError, int(varying.sum()) + len(grasp_set.taxel_columns))
 
 
 def _why_not(

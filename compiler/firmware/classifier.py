@@ -68,6 +68,10 @@ class Library:
         names, layout, tables = self.names, self.layout, self.layout.tables
         texts, prefix = answers_of(names), f"THENAR_{self.name.upper()}"
         switches, joints = [switch.name for switch in names.switches], [joint.name for joint in names.joints]
+        rows = _row_lines(layout.start[None], layout, "START")
+        for title, inputs, section in layout.sections:
+            said = [(switches if title == "switches" else joints)[n] for n in inputs]
+            rows += ["", *_remark(f"{title}: {', '.join(map(comment, said))}"), *_row_lines(section, layout, "PAIR")]
         values = {
             "name": self.name,
             "names": names,
@@ -81,7 +85,7 @@ class Library:
             "name_bytes": 1 + max(len(text.encode()) for text in texts),
             "softmax": Softmax(tables.scale),
             "columns": _remark(f"The entries of a row: {', '.join(map(comment, names.grasps))}."),
-            "rows": [*_row_lines(layout.start[None], layout, "START"), *_section_lines(names, layout)],
+            "rows": rows,
             "slopes": _row_lines([line.row.astype(int) for line in tables.lines], layout, "SLOPES"),
             "straight": straight(layout),
             "grasp_enum": _enumerators(f"{prefix}_GRASP", names.grasps, names.grasps),
@@ -119,13 +123,6 @@ def _cells(cells: Iterable[object], suffix: str = "") -> str:
     """Return cells without breaks as lines, each cell followed by `suffix` and a comma."""
     text = " ".join(f"{cell}{suffix}," for cell in cells)
     return "\n".join(_INDENT + line for line in wrap(text, COLUMNS - len(_INDENT), break_on_hyphens=False))
-
-
-def _section_lines(names: Manifest, layout: Layout) -> Iterable[str]:
-    for title, inputs, rows in layout.sections:
-        said = [names.switches[n].name if title == "switches" else names.joints[n].name for n in inputs]
-        yield from ["", *_remark(f"{title}: {', '.join(map(comment, said))}")]
-        yield from _row_lines(rows, layout, "PAIR")
 
 
 def _row_lines(rows: Iterable[Rows], layout: Layout, macro: str) -> list[str]:

@@ -114,7 +114,11 @@ def _sketch(name: str, kept: _Kept, stream: StreamWiring, board: BoardWiring) ->
     pins = [(numbers[name], pin, comment(name)) for name, pin in board.pins.items() if name in numbers]
     matrix = [] if board.matrix is None else list(_matrix_rows(board.matrix, numbers))
     columns = (pin for _, keys in matrix for _, pin, _ in keys)
-    analog, channels = _analog_inputs(kept, board)
+    # The readings of analog pins, and by the channel of the multiplexers those behind them.
+    analog, channels = list[_Input](), dict[int, list[_Input]]()
+    for number, reading in enumerate(kept.readings):
+        pin, _, channel = board.pins[reading].partition(".")
+        (channels.setdefault(int(channel), []) if channel else analog).append((number, pin, comment(reading)))
     line = ",".join(("columns", *kept.columns))  # everything between `$` and `*`
     return render(
         "rows/NAME.ino.j2",
@@ -129,7 +133,7 @@ def _sketch(name: str, kept: _Kept, stream: StreamWiring, board: BoardWiring) ->
         pulled_up=dict.fromkeys((*(pin for _, pin, _ in pins), *(pin for pin, _ in matrix), *columns)),
         chips=list(_chips(board, numbers)),
         analog=analog,
-        channels=channels,
+        channels=sorted(channels.items()),
     )
 
 
@@ -151,15 +155,6 @@ def _check_ghosts(matrix: BoardMatrix, numbers: dict[str, int]) -> None:
                 f"the matrix has no diodes, so that of {list_names(square)} the fourth reads closed when three are: "
                 "put a diode in series with every key, and set diodes = true"
             )
-
-
-def _analog_inputs(kept: _Kept, board: BoardWiring) -> tuple[list[_Input], list[tuple[int, list[_Input]]]]:
-    """Return the readings of analog pins, and by the channel of the multiplexers those behind them."""
-    analog, channels = list[_Input](), dict[int, list[_Input]]()
-    for number, name in enumerate(kept.readings):
-        pin, _, channel = board.pins[name].partition(".")
-        (channels.setdefault(int(channel), []) if channel else analog).append((number, pin, comment(name)))
-    return analog, sorted(channels.items())
 
 
 def _chips(board: BoardWiring, numbers: dict[str, int]) -> Iterator[dict[str, object]]:

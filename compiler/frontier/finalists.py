@@ -158,7 +158,11 @@ def select_finalists(screened: Sequence[Screened], recipes: Collection[Recipe], 
     and switches count once; those with less than three quarters of the best accuracy are dropped.
     """
     enough = _USEFUL * max((one.mean for one in screened), default=0.0)
-    best = _fronts([one for one in _different(screened) if one.mean >= enough])
+    first = {}
+    for one in reversed(screened):
+        rest = changed_to(one.recipe, placement=PAPERS, keep=None, prune=0)
+        first[rest, *sorted(one.elements)] = one
+    best = _fronts([one for one in reversed(first.values()) if one.mean >= enough])
     kinds = dict.fromkeys(one.recipe.inputs for one in best)
     queues = [_spread([one for one in best if one.recipe.inputs == kind]) for kind in kinds]
     turns = [one for turn in zip_longest(*queues) for one in turn if one is not None]
@@ -192,15 +196,6 @@ def _distance(one: Screened, other: Screened) -> float:
     """Return how far error rates and frame times differ: halving either is the same distance everywhere."""
     errors, other_errors = (log(1.0 - screened.mean + _FEWEST) for screened in (one, other))
     return abs(errors - other_errors) + abs(log(one.frame_us / other.frame_us))
-
-
-def _different(screened: Sequence[Screened]) -> list[Screened]:
-    """Return the first of those that keep the same inputs."""
-    first = {}
-    for one in reversed(screened):
-        rest = changed_to(one.recipe, placement=PAPERS, keep=None, prune=0)
-        first[rest, *sorted(one.elements)] = one
-    return list(first.values())[::-1]
 
 
 def evaluate_finalists(survey: Survey, chosen: Sequence[Screened]) -> tuple[EvaluatedFinalist, ...]:

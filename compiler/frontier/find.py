@@ -162,7 +162,9 @@ def find_frontier(
         if output is not None:
             # The store moves into the new folder as the same file, and stays locked meanwhile.
             store.finish()
-            publish_folder(_documents(frontier), output, kept_entries, FrontierError)
+            files = frontier_to_bytes(frontier), csv_bytes(frontier), picture(frontier, "svg")
+            named = dict(zip((FRONTIER_NAME, TABLE_NAME, PICTURE_NAME), files, strict=True))
+            publish_folder(named, output, kept_entries, FrontierError)
     return frontier
 
 
@@ -211,11 +213,6 @@ def kept_entries(folder: Path) -> list[str]:
     if there and not {FRONTIER_NAME, STORE_NAME} & set(there):
         raise FrontierError(f"{folder} is not empty and holds no frontier: name another folder")
     return [path for path in there if path not in _DOCUMENTS]
-
-
-def _documents(frontier: Frontier) -> dict[str, bytes]:
-    files = frontier_to_bytes(frontier), csv_bytes(frontier), picture(frontier, "svg")
-    return dict(zip((FRONTIER_NAME, TABLE_NAME, PICTURE_NAME), files, strict=True))
 
 
 def _found(survey: Survey, rough: Callable[[Frontier], None]) -> Frontier:

@@ -10,7 +10,7 @@ from thenar.runtime.recipe import Inputs
 from ..evaluation.rates import Rate, interval
 from ..pictures import FONT, WIDTH, Box, around, on_paper, painting, rendered, write_beside
 from ..text import counted, duration
-from .points import Frontier, Tried, front
+from .points import Frontier, front
 from .words import elements_of, featured, inputs_of, of_time, shorten
 
 if TYPE_CHECKING:
@@ -61,7 +61,12 @@ def draw(frontier: Frontier) -> "Figure":
     moved = _apart(axes, [x for x, _ in apart])
     places = dict(zip(((x, id(rate)) for x, rate in apart), moved, strict=True))
 
-    _draw_tried(axes, tried)
+    for inputs, colour in _COLOURS.items() if tried else ():
+        xs = [x for x, each in tried if each.inputs == inputs]
+        ys = [each.rate.mean for _, each in tried if each.inputs == inputs]
+        axes.scatter(xs, ys, s=_TRIED_SIZE, marker=_SHAPES[inputs], color=colour, alpha=0.22, lw=0, zorder=1.5)
+    if tried:
+        axes.scatter([], [], s=2 * _TRIED_SIZE, color=_GREY, alpha=0.6, lw=0, label="tried")
     lines, labels = _draw_best(axes, [(x, point.rate.mean) for x, point in points if _FRONT in point.fronts]), []
     for inputs, colour in _COLOURS.items():
         mine = [(x, point) for x, point in points if point.setting.inputs == inputs]
@@ -166,17 +171,6 @@ def _apart(axes: "Axes", xs: Sequence[float]) -> list[float]:
         places[number] = min(places[number], edge - (len(places) - 1 - number) * least)
     inverse, moved = axes.transData.inverted(), dict(zip(order, places, strict=True))
     return [float(inverse.transform((moved[number], 0))[0]) for number in range(len(xs))]
-
-
-def _draw_tried(axes: "Axes", tried: Sequence[tuple[float, Tried]]) -> None:
-    """Draw the screened placements, faintly."""
-    if not tried:
-        return
-    for inputs, colour in _COLOURS.items():
-        xs = [x for x, each in tried if each.inputs == inputs]
-        ys = [each.rate.mean for _, each in tried if each.inputs == inputs]
-        axes.scatter(xs, ys, s=_TRIED_SIZE, marker=_SHAPES[inputs], color=colour, alpha=0.22, lw=0, zorder=1.5)
-    axes.scatter([], [], s=2 * _TRIED_SIZE, color=_GREY, alpha=0.6, lw=0, label="tried")
 
 
 def _draw_best(axes: "Axes", best: Iterable[tuple[float, float]]) -> list[Box]:

@@ -165,6 +165,7 @@ def netlist_of(circuit: Circuit, title: str) -> bytes:
 
     It holds no date and no path: the same circuit gives the same bytes.
     """
+    kinds = {(each.kind.library, each.kind.symbol): each.kind for each in circuit.components}
     lines = [
         f"(export (version {_quoted(_VERSION)})",
         f'  (design (source {_quoted(title)}) (date "") (tool "thenar")',
@@ -173,7 +174,7 @@ def netlist_of(circuit: Circuit, title: str) -> bytes:
         *(line for component in circuit.components for line in _component(component)),
         "  )",
         "  (libparts",
-        *(line for kind in _symbols(circuit) for line in _libpart(kind)),
+        *(line for kind in kinds.values() for line in _libpart(kind)),
         "  )",
         "  (libraries)",
         "  (nets",
@@ -198,11 +199,6 @@ def _component(component: Component) -> Iterator[str]:
         yield '      (property (name "exclude_from_board"))'
     yield '      (sheetpath (names "/") (tstamps "/"))'
     yield f"      (tstamps {_quoted(str(uuid.uuid5(_NAMESPACE, component.ref)))}))"
-
-
-def _symbols(circuit: Circuit) -> list[ComponentKind]:
-    """Return one kind of component for each symbol."""
-    return list({(c.kind.library, c.kind.symbol): c.kind for c in circuit.components}.values())
 
 
 def _libpart(kind: ComponentKind) -> Iterator[str]:

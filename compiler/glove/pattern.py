@@ -180,20 +180,17 @@ def svg_of(pattern: Pattern) -> bytes:
         group = ET.SubElement(root, "g", attributes)
         for shape in shapes:
             if shape.layer == layer:
-                _add_to_svg(group, shape, page.height_mm)
+                match shape:
+                    case PatternLine(points=points, closed=closed):
+                        places = " ".join(f"{x:.3f},{page.height_mm - y:.3f}" for x, y in points)
+                        ET.SubElement(group, "polygon" if closed else "polyline", {"points": places})
+                    case Circle(x=x, y=y, radius=radius):
+                        place = {"cx": f"{x:.3f}", "cy": f"{page.height_mm - y:.3f}"}
+                        ET.SubElement(group, "circle", {**place, "r": f"{radius:g}"})
+                    case Text():
+                        _add_text(group, shape, page.height_mm)
     ET.indent(root, " ")
     return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode").encode() + b"\n"
-
-
-def _add_to_svg(group: ET.Element, shape: Shape, height_mm: float) -> None:
-    match shape:
-        case PatternLine(points=points, closed=closed):
-            places = " ".join(f"{x:.3f},{height_mm - y:.3f}" for x, y in points)
-            ET.SubElement(group, "polygon" if closed else "polyline", {"points": places})
-        case Circle(x=x, y=y, radius=radius):
-            ET.SubElement(group, "circle", {"cx": f"{x:.3f}", "cy": f"{height_mm - y:.3f}", "r": f"{radius:g}"})
-        case Text():
-            _add_text(group, shape, height_mm)
 
 
 def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:

@@ -151,6 +151,9 @@ def glove_spec(
     bought = {sensor.name: sensor.ref for sensor in switches} if parts else {}
     if parts and wired.cyberglove is None:
         bought |= {joint: joint for joint in joints}
+    groups: dict[str, list[WireEnd]] = {}
+    for end in ends:
+        groups.setdefault(end.unit.ref, []).append(end)
     kept = str(SensorCount.of_build(manifest))
     size = "" if known is None or known.length_mm is None else f", right hand of {known.length_mm:g} mm"
     title = f"{wired.name}: {counted_sensors(switches)}{size}"
@@ -162,7 +165,10 @@ def glove_spec(
         hand_length_mm=None if known is None else known.length_mm,
         print_on="" if pattern is None else pattern[0].hint,
         sensors=switches,
-        readers=_readers(ends),
+        readers=tuple(
+            SwitchReader(ref, its[0].unit.place, tuple(end.pin for end in its), tuple(end.switch + 1 for end in its))
+            for ref, its in sorted(groups.items(), key=lambda item: (item[0][0], int(item[0][1:])))
+        ),
         wires=wires,
         materials=(
             *bill_of_parts(bought, parts or {}),
@@ -208,16 +214,6 @@ def _of_boards(harness: Harness) -> Iterator[str]:
                 f"A{number}: S0 to S3 of its multiplexers go to {', '.join(stream.board.select)}, their commons to "
                 f"{', '.join(commons)}"
             )
-
-
-def _readers(ends: Sequence[WireEnd]) -> tuple[SwitchReader, ...]:
-    groups: dict[str, list[WireEnd]] = {}
-    for end in ends:
-        groups.setdefault(end.unit.ref, []).append(end)
-    return tuple(
-        SwitchReader(ref, group[0].unit.place, tuple(end.pin for end in group), tuple(end.switch + 1 for end in group))
-        for ref, group in sorted(groups.items(), key=lambda item: (item[0][0], int(item[0][1:])))
-    )
 
 
 def _remarks(

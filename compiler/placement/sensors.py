@@ -198,17 +198,10 @@ class SensorSearch:
         for place in self._missed(now)[:EXCHANGED]:
             rest = self._without(now, place)
             others = self._candidates(rest, now.sensors[place])
-            tried = [self._with(rest, one) for one in others if self._is_new({*rest.sensors, one})]
-            if tried:
-                yield min(tried, key=_loss)
-
-    def _is_new(self, sensors: set[int]) -> bool:
-        """Return whether an exchange comes upon these sensors for the first time."""
-        known = frozenset(sensors)
-        if known in self._seen:
-            return False
-        self._seen.add(known)
-        return True
+            new = [one for one in others if frozenset({*rest.sensors, one}) not in self._seen]
+            self._seen |= {frozenset({*rest.sensors, one}) for one in new}
+            if new:
+                yield min((self._with(rest, one) for one in new), key=_loss)
 
     def _candidates(self, now: SensorSet, *never: int) -> list[int]:
         """Return the sensors of the largest estimated gain, or gain for its price, that may be added."""

@@ -325,7 +325,7 @@ def sound_grid(values: NDArray[np.float64]) -> float:
     span, far = largest - least, max(abs(least), abs(largest))
     if not 0 < span <= LARGEST_VALUE:
         return 1.0
-    finest = _round_up(max(span / (CODES - 2), far * 1e-8, 1 / LARGEST_VALUE))
+    finest = _rounded(max(span / (CODES - 2), far * 1e-8, 1 / LARGEST_VALUE), up=True)
     for exponent in range(
         min(0, math.floor(math.log10(span))), math.ceil(math.log10(max(span / _OWN_STEPS, finest)) - 1e-9) - 1, -1
     ):
@@ -333,16 +333,13 @@ def sound_grid(values: NDArray[np.float64]) -> float:
         if np.allclose(steps, np.rint(steps), 0, 1e-6):
             return float(f"1e{exponent}")
     low, high = np.percentile(values, [1, 99]).tolist()
-    return max(_round_down(max((high - low) / _STEPS, finest)), finest)
+    return max(_rounded(max((high - low) / _STEPS, finest), up=False), finest)
 
 
-def _round_down(number: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is not above `number`."""
+def _rounded(number: float, *, up: bool) -> float:
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above `number`, or the smallest not below."""
     exponent = math.floor(math.log10(number) + 1e-9)
-    return next(step for factor in (5, 2, 1, 0.5) if (step := float(f"{factor}e{exponent}")) <= number * (1 + 1e-9))
-
-
-def _round_up(number: float) -> float:
-    """Return the smallest of 1, 2 and 5 times a power of ten that is not below `number`."""
-    exponent = math.floor(math.log10(number) + 1e-9)
-    return next(step for factor in (1, 2, 5, 10) if (step := float(f"{factor}e{exponent}")) >= number * (1 - 1e-9))
+    steps = [float(f"{factor}e{exponent}") for factor in (0.5, 1, 2, 5, 10)]
+    if up:
+        return next(step for step in steps[1:] if step >= number * (1 - 1e-9))
+    return next(step for step in steps[3::-1] if step <= number * (1 + 1e-9))

@@ -431,18 +431,13 @@ def _taxel(
         taxel, line = Joint(name, target.unit, *structs.astuple(_points(target))), None
     elif line is not None:
         taxel = Joint(name, _taxel_unit(first), line.rest, 0.0, line.press, line.value)
-    codes = []
+    coded, codes = BuildCalibration(0, name, taxel.unit, *structs.astuple(_points(taxel))), []
     for part, grasp in grasps:
         count, own = grasp.counts[place], _line(part.session, place)
         assert count is not None
-        code = count if own is None or own == line else own.codes(_coded(taxel)).code(count)
+        code = count if own is None or own == line else own.codes(coded).code(count)
         codes.append(min(max(code, 0), CODES - 1))
     return codes, taxel
-
-
-def _coded(joint: Joint) -> BuildCalibration:
-    """Return the meaning of a joint's or taxel's codes in the form that a build uses."""
-    return BuildCalibration(0, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
 
 
 def _line(session: Session, place: int) -> TaxelLine | None:
@@ -454,5 +449,5 @@ def _raw(name: str, part: _Part, grasp: _Grasp) -> int:
     return grasp.glove.sensors[part.session.sensors.index(name)]
 
 
-def _points(target: BuildCalibration) -> CalibrationPoints:
+def _points(target: BuildCalibration | Joint) -> CalibrationPoints:
     return CalibrationPoints(target.code_a, target.value_a, target.code_b, target.value_b)

@@ -225,7 +225,12 @@ def _coded(names: list[str], sets: list[_Coded]) -> _Coded:
     lines = tuple(_line(names, [found[joint.name][0] for found in own]) for joint in sets[0][0])
     codes = np.zeros((sum(len(codes) for _, codes in sets), len(lines)), np.uint16)
     for place, line in enumerate(lines):
-        moved = [_moved(name, line, *found[line.name]) for name, found in zip(names, own, strict=True)]
+        moved = []
+        for name, (joint, given) in zip(names, (found[line.name] for found in own), strict=True):
+            moved.append(given.astype(np.int64) + (int(line.code(joint.value_a)) - joint.code_a))
+            if moved[-1].max(initial=0) >= CODES:
+                called = shortened(line.name)
+                raise RecordingError(f"{name}: {called} gets codes above {CODES - 1}: import with a coarser grid")
         codes[:, place] = np.concatenate(moved)
     return lines, codes
 
@@ -245,14 +250,6 @@ def _line(names: list[str], joints: list[Joint]) -> Joint:
             )
     # The line that starts lowest, or highest if values fall as codes rise.
     return min(joints, key=lambda joint: float(joint.value(0)) / first.step)
-
-
-def _moved(name: str, line: Joint, own: Joint, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return the codes (n,) on `line` with the same meaning as these on `own`."""
-    moved = codes.astype(np.int64) + (int(line.code(own.value_a)) - own.code_a)
-    if moved.max(initial=0) >= CODES:
-        raise RecordingError(f"{name}: {shortened(line.name)} gets codes above {CODES - 1}: import with a coarser grid")
-    return moved
 
 
 def _origin(sets: list[GraspSet]) -> str:

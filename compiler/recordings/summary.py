@@ -267,7 +267,10 @@ def _likeness(grasp_set: GraspSet) -> tuple[str, str] | None:
     is not simulated. Rows in which nothing is held are ignored: no rate counts them.
     """
     grasp_set = grasp_set.without_none()
-    rows, group = _units(grasp_set)
+    order, group = _in_groups(grasp_set)
+    first = np.flatnonzero(np.diff(grasp_set.trial_ids[order], prepend=-1) != 0)
+    middle = first + np.diff(first, append=len(order)) // 2
+    rows, group = order[middle], group[middle]
     # A scene without noise repeats itself, and its repetitions are numbered correctly.
     if not grasp_set.simulated and (reason := _copies(grasp_set, rows, group)):
         return reason, _NUMBER.format("the trials") + _STATE
@@ -301,11 +304,9 @@ def _likeness(grasp_set: GraspSet) -> tuple[str, str] | None:
 
 def _are_apart(grasp_set: GraspSet) -> bool:
     """Return whether steps from one trial to the next are larger than steps between the rows of a trial."""
-    group = groups(grasp_set.labels, grasp_set.subjects, grasp_set.objects, grasp_set.sessions)
-    order = np.argsort(group, kind="stable")
-    rows, others = order[:-1], order[1:]
-    alike = group[rows] == group[others]
-    rows, others = rows[alike], others[alike]
+    order, group = _in_groups(grasp_set)
+    alike = group[:-1] == group[1:]
+    rows, others = order[:-1][alike], order[1:][alike]
     inside = grasp_set.trial_ids[rows] == grasp_set.trial_ids[others]
     count = int(np.count_nonzero(~inside))
     if not count or not inside.any():
@@ -315,14 +316,11 @@ def _are_apart(grasp_set: GraspSet) -> bool:
     return larger >= _APART and larger - 0.5 >= _ERRORS * (0.25 / count) ** 0.5
 
 
-def _units(grasp_set: GraspSet) -> tuple[Rows, Rows]:
-    """Return the middle row (m,) of each run of rows of one trial, in the order of groups, and the groups (m,)."""
+def _in_groups(grasp_set: GraspSet) -> tuple[Rows, Rows]:
+    """Return the rows (n,) in the order of groups, and the groups (n,) in this order."""
     group = groups(grasp_set.labels, grasp_set.subjects, grasp_set.objects, grasp_set.sessions)
     order = np.argsort(group, kind="stable")
-    trial = grasp_set.trial_ids[order]
-    first = np.flatnonzero(np.diff(trial, prepend=-1) != 0)
-    middle = first + np.diff(first, append=len(order)) // 2
-    return order[middle], group[order[middle]]
+    return order, group[order]
 
 
 def _copies(grasp_set: GraspSet, rows: Rows, group: Rows) -> str | None:

@@ -74,7 +74,12 @@ def find_files(pattern: Path) -> tuple[list[TrialFile], list[str]]:
     if len(kinds) > 1:
         raise TableError(f"{pattern} matches files of several kinds, {list_names(kinds)}: name one")
     found.sort(key=lambda file: natural_key(file.name))
-    _check_distinct(found)
+    seen: dict[tuple[int, int], TrialFile] = {}
+    for file in found:
+        status = file.path.stat()
+        first = seen.setdefault((status.st_dev, status.st_ino), file)
+        if first is not file:
+            raise TableError(f"{file.name} and {first.name} are one file: its trial would count twice, remove the link")
     return found, sorted(others)
 
 
@@ -110,16 +115,6 @@ def _matches(folder: TrialFile, expression: re.Pattern[str], last: bool, others:
                 yield TrialFile(Path(entry.path), f"{folder.name}/{entry.name}".lstrip("/"), folder.fields | fields)
             elif last:
                 others.append(entry.name)
-
-
-def _check_distinct(files: Sequence[TrialFile]) -> None:
-    """Raise TableError if two paths are one file, through a link: its trial would count twice."""
-    seen: dict[tuple[int, int], TrialFile] = {}
-    for file in files:
-        status = file.path.stat()
-        first = seen.setdefault((status.st_dev, status.st_ino), file)
-        if first is not file:
-            raise TableError(f"{file.name} and {first.name} are one file: its trial would count twice, remove the link")
 
 
 def read_files(files: Sequence[TrialFile], text: TextFormat, report: Report) -> Table:

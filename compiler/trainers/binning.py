@@ -198,21 +198,13 @@ def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -
     present = ~np.isnan(values)
     edges = midpoints(values[present])
     if max_bins is not None and len(edges) >= max_bins:
-        heavy = counts if weights is None else np.bincount(bins, weights)
-        kept = _even(heavy[present], max_bins)
+        heavy = (counts if weights is None else np.bincount(bins, weights))[present]
+        # Edge i lies where the share of rows below it is nearest to i of `max_bins` equal parts; ties go to the first.
+        below, wanted = np.cumsum(heavy)[:-1], np.arange(1, max_bins) * heavy.sum()
+        kept = np.unique([np.argmin(np.abs(max_bins * below - share)) for share in wanted])
         edges = edges[kept]
         bins = np.where(np.isnan(numbers), len(edges) + 1, np.searchsorted(kept, bins))
     return BinnedColumn(bins.astype(np.int32), edges, not present.all())
-
-
-def _even(counts: NDArray[np.intp] | Floats, bins: int) -> NDArray[np.intp]:
-    """Return the positions at which to split sorted values with these row `counts` into at most `bins` bins.
-
-    Edge i lies where the share of rows below it is nearest to i of `bins` equal parts; ties go to the first position.
-    """
-    below = np.cumsum(counts)[:-1]
-    wanted = np.arange(1, bins) * counts.sum()
-    return np.unique([np.argmin(np.abs(bins * below - share)) for share in wanted])
 
 
 def midpoints(values: Floats) -> Floats:

@@ -69,7 +69,10 @@ def fit_pairs(
     binned = bin_columns(codes, pair_bins).columns
     found = _ranked(binned, alone.residuals(rows), pairs)
     if found:
-        made = [_column(binned[a], binned[b], pair_smoothness) for a, b in found]
+        made = []
+        for first, second in ((binned[a], binned[b]) for a, b in found):
+            shape = len(first.edges) + 1, len(second.edges) + 1
+            made.append(Column(np.zeros(0), _cells(first, second), 0, cells=shape, smoothness=pair_smoothness))
         rows = Fit([*columns, *count, *made], labels, n_classes, penalty, smoothness, None, held).minimum(
             tolerance, rows
         )
@@ -87,11 +90,6 @@ def _cells(one: BinnedColumn, other: BinnedColumn) -> NDArray[np.intp]:
     """Return the cell (n,) of each frame in the grid of two joints' bins, numbered row by row."""
     cells: NDArray[np.intp] = one.bins.astype(np.intp) * (len(other.edges) + 1) + other.bins
     return cells
-
-
-def _column(one: BinnedColumn, other: BinnedColumn, smoothness: float) -> Column:
-    shape = len(one.edges) + 1, len(other.edges) + 1
-    return Column(np.zeros(0), _cells(one, other), 0, cells=shape, smoothness=smoothness)
 
 
 def _ranked(binned: Mapping[int, BinnedColumn], residuals: tuple[Floats, Floats], most: int) -> list[tuple[int, int]]:

@@ -47,13 +47,6 @@ def test_every_option_reaches_the_build(set_file: Path, tmp_path: Path) -> None:
     assert json.loads(done.stdout)["options"] == options
 
 
-def test_tables_have_8_or_16_bits(set_file: Path, tmp_path: Path) -> None:
-    done = thenar("compile", set_file, "-o", tmp_path / "build", "--table-bits", 9)
-    assert done.returncode == 2
-    assert "'9' is not one of '16', '8'" in done.stderr
-    assert not (tmp_path / "build").exists()
-
-
 def test_a_tolerance_ends_the_training_and_the_build_says_so(set_file: Path, tmp_path: Path) -> None:
     given = ("compile", set_file, "-o", tmp_path / "build", "--no-report", "--rounds", 500, "--folds", 0)
     done = thenar(*given, "--tolerance", 0.01)
@@ -61,14 +54,6 @@ def test_a_tolerance_ends_the_training_and_the_build_says_so(set_file: Path, tmp
     assert 1 < rounds < 500
     assert f"stopped after {rounds} of 500 rounds: the last changed the mean loss by less than 0.01" in done.stdout
     assert thenar(*given, "--tolerance", "nan").returncode == 2
-
-
-def test_a_training_that_no_tolerance_ends_says_nothing_of_it(set_file: Path, tmp_path: Path) -> None:
-    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 3, "--folds", 0, "--no-report")
-    assert "stopped" not in done.stdout
-    document = json.loads((tmp_path / "build" / "build.json").read_bytes())
-    assert "stopped_after" not in document
-    assert "tolerance" not in document["options"]
 
 
 def test_a_build_that_answers_one_grasp_type_only_says_so(small_set: GraspSet, tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import html
 import json
 import re
-import shlex
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -27,12 +26,6 @@ def done(result: subprocess.CompletedProcess[str]) -> str:
     return result.stdout
 
 
-def refused(result: subprocess.CompletedProcess[str]) -> str:
-    assert result.returncode == 2
-    assert "Traceback" not in result.stderr
-    return " ".join(result.stderr.split())
-
-
 def told(build: Path) -> str:
     """Return the words of a build's report, without its styles and scripts."""
     page = (build / "report.html").read_text()
@@ -51,12 +44,6 @@ def gloved_file(gloved: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
     path = tmp_path_factory.mktemp("gloved") / "set.grasps"
     gloved.save(path)
     return path
-
-
-def test_no_report_leaves_out_the_report_and_the_spec(gloved_file: Path, tmp_path: Path) -> None:
-    done(thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--no-report"))
-    made = sorted(path.name for path in (tmp_path / "build").iterdir())
-    assert made == ["build.json", "ensemble.bin", "firmware", "hand.json", "tables.bin"]
 
 
 def test_the_spec_in_a_build_is_what_spec_writes_of_it(gloved_file: Path, tmp_path: Path) -> None:
@@ -81,33 +68,6 @@ def test_a_wiring_is_in_the_report_and_its_spec_agrees(gloved_file: Path, tmp_pa
         assert path.read_bytes() == (build / "spec" / path.name).read_bytes(), path.name
 
 
-def test_a_method_that_takes_a_number_keeps_it(gloved_file: Path, tmp_path: Path) -> None:
-    build = tmp_path / "build"
-    done(thenar("compile", gloved_file, "-o", build, *QUICK, "--method", "elimination", "--keep", 2))
-    document = json.loads((build / "build.json").read_bytes())
-    assert len(document["switches"]) == 2
-    assert document["options"]["placement"] == "elimination"
-    assert document["options"]["keep"] == 2
-    assert "No tree: the switches were chosen by elimination." in told(build)
-
-
-@pytest.mark.parametrize(
-    ("given", "because"),
-    [
-        (("--method", "elimination"), "needs --keep"),
-        (("--method", "elimination", "--keep", 2, "--prune", 3), "takes --keep M and no --prune"),
-        (("--keep", 2), "takes --prune S and no --keep"),
-        (("--method", "crystal-ball", "--keep", 2), "there is no method 'crystal-ball'"),
-    ],
-)
-def test_a_method_gets_its_own_parameter(
-    gloved_file: Path, tmp_path: Path, given: tuple[object, ...], because: str
-) -> None:
-    result = thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK, *given)
-    assert because in refused(result)
-    assert not (tmp_path / "build").exists()
-
-
 def test_a_width_bounds_every_sum(gloved_file: Path, tmp_path: Path) -> None:
     bounds = []
     for width in (6, 16):
@@ -117,15 +77,3 @@ def test_a_width_bounds_every_sum(gloved_file: Path, tmp_path: Path) -> None:
         assert 0 < proof["bound"] <= 2 ** (width - 1) - 1
         bounds.append(proof["bound"])
     assert bounds[0] < bounds[1]
-
-
-def test_the_commands_of_a_report_make_the_build_again(gloved_file: Path, tmp_path: Path) -> None:
-    build, again = tmp_path / "build", tmp_path / "again"
-    given = ("--rounds", 3, "--folds", 2, "--method", "elimination", "--keep", 3, "--width", 12, "--max-bins", 5)
-    done(thenar("compile", gloved_file, "-o", build, *given))
-    (said,) = re.findall(r"thenar compile SET\.grasps -o build/ --prune.*", (build / "report.html").read_text())
-    words = {"SET.grasps": str(gloved_file), "build/": str(again)}
-    done(thenar(*(words.get(word, word) for word in shlex.split(said)[1:])))
-    for path in build.rglob("*"):
-        if path.is_file():
-            assert path.read_bytes() == (again / path.relative_to(build)).read_bytes(), path.name

@@ -99,14 +99,6 @@ def test_options_that_do_not_go_together_are_refused(set_file: Path, tmp_path: P
     assert not (tmp_path / "build").exists()
 
 
-def test_a_harness_without_the_kept_switches_is_told_which(set_file: Path, tmp_path: Path) -> None:
-    glove = tmp_path / "glove.toml"
-    glove.write_text("")
-    done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
-    assert done.returncode == 2
-    assert "harness 'glove' has no pin or column for s" in done.stderr
-
-
 def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(set_file: Path, small_set: GraspSet, tmp_path: Path) -> None:
     names = list(small_set.switch_names)
     columns = ", ".join(f'"{name}"' for name in ["ms", *names, "j0"])
@@ -123,14 +115,6 @@ def test_compile_and_run_refuse_a_glove_that_lacks_a_joint(set_file: Path, small
     assert thenar("run", build, "--glove", glove, "--frames", 1).stderr == refused.stderr
     fewer = thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--glove", glove, "--inputs", "switches")
     assert (fewer.returncode, fewer.stderr) == (0, "")
-
-
-def test_a_glove_that_measures_no_joints_is_a_warning(set_file: Path, tmp_path: Path) -> None:
-    build, glove = tmp_path / "build", tmp_path / "glove.toml"
-    assert thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--propose", glove).returncode == 0
-    done = thenar("compile", set_file, "-o", build, *FEW, "--no-report", "--glove", glove)
-    assert done.returncode == 0
-    assert "warning: nothing in 'glove' reads the build's joints, and every grasp is degraded" in done.stderr
 
 
 def test_verify_run_and_segment_report_missing_inputs_alike(

@@ -104,11 +104,6 @@ def test_a_file_that_lists_no_switches_is_refused_with_the_reason(
     assert reason in capsys.readouterr().err
 
 
-def test_a_folder_that_is_no_build_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["draw", "--kept", str(tmp_path), "-o", str(tmp_path / "no.svg")]) == 2
-    assert "build.json cannot be read" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("options", "reason"),
     [

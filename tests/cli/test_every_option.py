@@ -3,8 +3,6 @@
 import os
 import shutil
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -193,19 +191,3 @@ def test_every_command_that_writes_a_file_can_be_asked_to_replace_it() -> None:
             assert "overwrite" in parameters, command
         for each in written:
             assert each.endings, command
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
-def test_names_beyond_ascii_are_said_in_any_locale(command: str, place: Path) -> None:
-    (place / "größe ☃.grasps").write_bytes((place / "set.grasps").read_bytes())
-    arguments, options = (text.replace("set.grasps", "größe").split() for text in LINES[command])
-    words = [word.replace("größe", "größe ☃.grasps") for word in (*options, *arguments)]
-    environment = {**os.environ, "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
-    done = subprocess.run(
-        [sys.executable, "-m", "thenar.cli", command, *words], capture_output=True, env=environment, check=False
-    )
-    assert b"Traceback" not in done.stderr
-    assert b"bug in thenar" not in done.stderr, done.stderr
-    assert done.returncode in (0, 1, 2)
-    assert (done.stdout + done.stderr).isascii()

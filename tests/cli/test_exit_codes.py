@@ -55,51 +55,6 @@ def test_no_command_at_all_shows_the_help() -> None:
     assert "Choose and measure:" in done.stdout + done.stderr
 
 
-def test_an_unknown_command_is_one_sentence() -> None:
-    assert "No such command 'fly'" in _one_sentence(thenar("fly"))
-
-
-def test_an_unknown_option_is_one_sentence(set_file: Path) -> None:
-    assert "--wings" in _one_sentence(thenar("compile", set_file, "--wings", "2"))
-
-
-def test_no_terminal_obeys_a_name_in_a_complaint(tmp_path: Path) -> None:
-    (tmp_path / "a\x1b[2J\u202e.grasps").write_bytes(b"")
-    for name in ("a\x1b[2J\u202e.grasps", "none\x1b[2J\u202e"):
-        said = thenar("info", tmp_path / name)
-        assert said.returncode == 2
-        assert r"\x1b[2J\u202e" in said.stderr
-        assert said.stderr[:-1].isprintable()
-
-
-def test_a_missing_file_is_one_sentence(tmp_path: Path) -> None:
-    assert "does not exist" in _one_sentence(thenar("compile", tmp_path / "no.grasps", "-o", tmp_path / "b"))
-
-
-@pytest.mark.parametrize("command", ["compile", "verify", "run"])
-def test_a_foreign_file_is_one_sentence(tmp_path: Path, build_folder: Path, command: str) -> None:
-    foreign = tmp_path / "foreign.grasps"
-    foreign.write_text("not grasps")
-    arguments = {
-        "compile": (foreign, "-o", tmp_path / "b"),
-        "verify": (build_folder, foreign),
-        "run": (build_folder, "--replay", foreign),
-    }
-    assert "is not a thenar THNRGRSP file" in _one_sentence(thenar(command, *arguments[command]))
-
-
-def test_a_damaged_build_is_one_sentence(set_file: Path, build_folder: Path) -> None:
-    data = (build_folder / "tables.bin").read_bytes()
-    (build_folder / "tables.bin").write_bytes(data[:-1])
-    assert "tables.bin is not the one" in _one_sentence(thenar("run", build_folder, "--replay", set_file))
-
-
-def test_a_folder_of_the_users_is_one_sentence_and_untouched(set_file: Path, tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("keep me")
-    assert "not empty and not a build" in _one_sentence(thenar("compile", set_file, "-o", tmp_path))
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
-
-
 def _interrupt(command: list[str], ready: Path) -> "subprocess.CompletedProcess[str]":
     """Start `command`, wait until it has made the file `ready`, interrupt it as Ctrl-C does."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -244,6 +199,7 @@ def test_what_is_not_installed_is_named_with_the_extra_that_brings_it(
         "place {set} --method elimination --keep 2",
         "run {build} --replay {set}",
         "export {set} -o {new}.csv",
+        "simulate quick -o {new}.grasps --jobs 1 --repetitions 2",
     ],
 )
 def test_a_base_install_does_what_needs_no_extra(set_file: Path, build_folder: Path, tmp_path: Path, line: str) -> None:
@@ -259,9 +215,12 @@ def test_ports_on_the_command_line_obey_the_rules_of_files(tmp_path: Path) -> No
     assert victim.read_text() == "kept"
 
 
-@pytest.mark.parametrize("line", ["simulate --list", "simulate --list --json", "--help"])
-def test_a_command_ends_silently_when_the_reader_of_its_output_has_gone(line: str) -> None:
-    command = [sys.executable, "-m", "thenar.cli", *line.split()]
+@pytest.mark.parametrize("line", ["simulate --list", "simulate --list --json", "--help", "run {build} --replay {set}"])
+def test_a_command_ends_silently_when_the_reader_of_its_output_has_gone(
+    line: str, build_folder: Path, set_file: Path
+) -> None:
+    words = line.format(build=build_folder, set=set_file).split()
+    command = [sys.executable, "-m", "thenar.cli", *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         process.stdout.close()

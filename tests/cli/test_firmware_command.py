@@ -92,12 +92,6 @@ def test_what_was_measured_stands_in_the_header(build: Path, tmp_path: Path) -> 
     assert f"{measured['flash']} bytes of flash; " in opening
 
 
-def test_on_this_machine_there_is_nothing_to_count(build: Path) -> None:
-    done = thenar("firmware", build, "--target", "host", "--measure")
-    assert done.returncode == 2
-    assert "The host has no cycle counts" in done.stderr
-
-
 def glove_toml(build: Path, without: str = "", no_pin: str = "", matrix: str = "") -> str:
     """Return a glove.toml with the elements of a build on pins of a board, except one, and one without a pin."""
     manifest = Build.load(build).manifest

@@ -41,10 +41,6 @@ def compiled(examples: Any, set_file: Path, tmp_path: Path, capsys: Captured) ->
     return compile_point
 
 
-def test_a_point_that_can_be_built_is(compiled: Callable[[Change], tuple[int, str]]) -> None:
-    assert compiled(lambda point: point)[0] == 0
-
-
 def test_a_glove_that_the_point_is_not_wired_as_is_named(
     compiled: Callable[..., tuple[int, str]], set_file: Path, tmp_path: Path
 ) -> None:

@@ -59,12 +59,6 @@ def test_every_point_stands_in_the_csv(found_folder: Path, found: Frontier) -> N
     assert len(rows) == len(found.points) > 0
 
 
-def test_points_are_numbered_from_the_fastest_on(found: Frontier) -> None:
-    assert [point.number for point in found.points] == list(range(1, len(found.points) + 1))
-    times = [point.frame.us for point in found.points]
-    assert times == sorted(times)
-
-
 def test_the_picked_point_is_the_fastest_that_recognises_enough(found: Frontier) -> None:
     assert found.picked is not None
     picked = found.point(found.picked)

@@ -42,11 +42,6 @@ def test_rates_say_what_they_are_of_and_that_points_are_corrected(
     )
 
 
-def test_names_are_no_markup(examples: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    told = "\n".join(_printed(examples.example_frontier(source="[bold]:smile:[/nothing]"), capsys))
-    assert "[bold]:smile:[/nothing]" in told
-
-
 def test_no_points_and_one_subject_print_too(examples: Any, capsys: pytest.CaptureFixture[str]) -> None:
     told = "\n".join(_printed(examples.example_frontier(points=(), picked=None), capsys))
     assert "none is a point of the frontier" in told

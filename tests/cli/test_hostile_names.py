@@ -51,6 +51,7 @@ FILES = {
     "recording": ("a.mcap", EVIL, "segment {build} {file}"),
     "set": ("a.grasps", EVIL, "info {file}"),
     "name of a file": (f"{EVIL}.grasps", "", "info {file}"),
+    "name of no file": ("unused", "", f"info none{EVIL}"),
     "name of a folder": (f"{EVIL}.grasps", "", "verify {file} {set}"),
 }
 

@@ -69,16 +69,6 @@ def test_the_old_set_stays_when_the_import_fails(folder: Path) -> None:
     assert (folder / "set.grasps").read_bytes() == before
 
 
-def test_names_with_brackets_and_colons_are_printed_as_they_are(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (folder / "table.csv").write_text(TABLE.replace("j1", "j[/x] [deg] :thumbs_up:"))
-    assert thenar_import(folder) == 0
-    assert "j[/x] [deg] :thumbs_up:" in capsys.readouterr().out
-    assert run(["info", str(folder / "set.grasps")]) == 0
-    assert "j[/x] [deg] :thumbs_up:" in capsys.readouterr().out
-
-
 def test_the_columns_file_is_never_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     columns = (folder / "columns.toml").rename(folder / "c.grasps")
     assert run(["import", str(folder / "table.csv"), "-o", str(columns), "--columns", str(columns), "--overwrite"]) == 2
@@ -223,26 +213,6 @@ def test_who_states_that_rows_are_independent_is_asked_for_it(
     assert not (glove / "no.grasps").exists()
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("t.csv", b""),
-        ("t.tsv", b"a\tb\n" + b"x" * 200_000 + b"\t1\n"),
-        ("t.xlsx", b"PK\3\4junk"),
-    ],
-)
-def test_junk_without_a_columns_toml_is_one_sentence(
-    name: str, content: bytes, glove: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (glove / name).write_bytes(content)
-    assert run(["import", name, "-o", "set.grasps", "--yes"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"thenar: {name}")
-    assert said.count("\n") == 1
-    assert len(said) < 1000
-    assert not list(glove.glob("*.toml"))
-
-
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     types = ("cup", "pen")
@@ -266,15 +236,6 @@ def test_a_recording_needs_no_columns(recording: Path, folder: Path, capsys: pyt
         "2 trials of 2 frames, 2 grasp types (own); subjects 1, objects 1, switches 2, joints 0"
         in capsys.readouterr().out
     )
-
-
-def test_a_cut_recording_is_imported_with_a_warning(
-    recording: Path, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    os.truncate(recording, recording.read_bytes().rindex(b'"accepted"'))
-    assert run(["import", str(recording), "-o", str(folder / "set.grasps")]) == 0
-    assert len(GraspSet.load(folder / "set.grasps")) == 1
-    assert "warning: a.mcap is whole up to byte " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

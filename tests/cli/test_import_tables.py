@@ -66,18 +66,6 @@ def test_a_header_may_be_of_any_length(columns: int, capsys: pytest.CaptureFixtu
     assert f"{columns:,} joints rounded to codes, at most 0.0" in capsys.readouterr().out
 
 
-def test_the_wide_header_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    grasp_set = imported(cases / "wide_header" / "wide.csv", capsys)
-    assert (len(grasp_set), len(grasp_set.switch_names), len(grasp_set.joint_names)) == (24, 150, 0)
-
-
-def test_the_preface_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    grasp_set = imported(cases / "preface_lines" / "with_preface.csv", capsys)
-    assert grasp_set.joint_names == ("index_mcp", "thumb_ip")
-    assert "rows left out at the top: 7 (skip = 7), which have other cells" in capsys.readouterr().out
-    assert "skip = 7\n" in columns_toml().read_text()
-
-
 # OpenSim, Vicon Nexus, a spreadsheet saved as text, notes of two cells, and none.
 PREFACES = {
     "sto": "Coordinates\nversion=1\nnRows=24\n\nendheader\n",
@@ -189,15 +177,6 @@ def test_so_do_lists_of_spreadsheets_data_frames_and_parquet(capsys: pytest.Capt
         assert np.array_equal(imported(name, capsys).codes, codes)
     for made in (lists, lists.assign(data=[np.array(row) for row in lists["data"]])):
         assert np.array_equal(from_dataframe(made).codes, codes)
-
-
-def test_the_lists_of_the_cases(cases: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(cases / "list_in_cell" / "list.csv")
-    assert "no column tells which rows are frames of one trial" in refused(path, capsys)
-    text = columns_toml().read_text()
-    columns_toml().write_text('frames = "independent"\n' + text)
-    assert run(["import", path, "-o", "a.grasps", "--columns", str(columns_toml())]) == 0
-    assert GraspSet.load("a.grasps").joint_names == ("data.0", "data.1")
 
 
 ODDITIES = {

@@ -57,6 +57,7 @@ def test_what_contradicts_or_is_not_known_is_refused(set_file: Path, tmp_path: P
 def test_a_build_states_its_limits_and_its_report_the_command(set_file: Path, tmp_path: Path) -> None:
     build = tmp_path / "build"
     asked = "--method elimination --keep 3 --never s2 --have s5,s0 --at-most 4 taxels --budget-us 300 --robust"
+    asked += " --width 12 --max-bins 5"
     done = thenar("compile", set_file, "-o", build, "--rounds", 4, "--folds", 2, *asked.split())
     assert done.returncode == 0, done.stderr
     options = manifest_from_bytes((build / "build.json").read_bytes()).options

@@ -33,32 +33,6 @@ def test_the_placement_is_printed_for_machines_and_stored(
     assert placement["fingerprint"] == small_set.fingerprint()
 
 
-def test_the_tree_is_printed_with_the_names_of_switches_and_grasps(
-    set_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["place", str(set_file), "--tree"]) == 0
-    said = capsys.readouterr().out
-    assert said.startswith("s4?  60 rows, gain 0.6008 bits")
-    assert "pen  2 rows" in said
-
-
-def test_nodes_at_which_nothing_gains_are_said(
-    small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bits = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], bool)
-    replace(small_set.rows([0, 1, 4, 3]), switches=bits, switch_names=("a", "b")).save(tmp_path / "xor.grasps")
-    assert run(["place", str(tmp_path / "xor.grasps"), "--method", "id3"]) == 0
-    assert "at 1 node no switch gains anything alone" in capsys.readouterr().out
-
-
-def test_a_set_without_switches_is_refused(
-    small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    replace(small_set, switches=small_set.switches[:, :0], switch_names=()).save(tmp_path / "joints.grasps")
-    assert run(["place", str(tmp_path / "joints.grasps"), "--method", "id3"]) == 2
-    assert capsys.readouterr().err == "thenar: there are no switches to place: the set holds joints only\n"
-
-
 @pytest.mark.parametrize(
     ("options", "reason"),
     [

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from thenar.cli import run
+from thenar.cli.kept import kept_names
 from thenar.compiler.glove.propose import propose_harness
-from thenar.compiler.placement.kept import kept_names
 from thenar.runtime.harness.writing import harness_to_toml
 
 from ..sets import grasp_set_of

@@ -1,6 +1,4 @@
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import msgspec
@@ -172,22 +170,3 @@ def test_faults_of_combined_effects_name_file_and_line(
     scene.write_text(text + "\n" * (44 - text.count("\n")) + added)
     assert run(["simulate", str(scene), "-o", str(tmp_path / "set.grasps")]) == 2
     assert complaint(capsys).startswith(f"thenar: bad.toml, {sentence}")
-
-
-WITH_THE_BASE_ALONE = """
-import sys
-for name in ("scipy", "sklearn", "matplotlib", "joblib"):
-    sys.modules[name] = None
-from thenar.cli import main
-sys.argv = ["thenar", "simulate", "quick", "-o", sys.argv[1], "--jobs", "1", "--repetitions", "2"]
-main()
-"""
-
-
-def test_one_process_needs_nothing_beyond_the_base_dependencies(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", WITH_THE_BASE_ALONE, str(tmp_path / "set.grasps")]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert (done.returncode, done.stdout.splitlines()[0].partition(": ")[2].split(",")[0]) == (
-        0,
-        "54 trials of 54 frames",
-    ), done.stderr

@@ -140,8 +140,3 @@ def test_a_spec_is_replaced_whole_and_anything_else_is_kept(
     (other / "letter.txt").write_text("dear")
     assert "is not a spec" in refused(thenar("spec", hand_build, "-o", other))
     assert [path.name for path in other.iterdir()] == ["letter.txt"]
-
-
-def test_a_build_without_switches_is_refused(small_set: GraspSet, tmp_path: Path) -> None:
-    build = compile_build(small_set, tmp_path / "build", rounds=3, folds=0, inputs="joints").folder
-    assert "keeps no switch" in refused(thenar("spec", build))

@@ -57,16 +57,6 @@ def test_a_broken_bound_exits_with_1_and_lists_rows(set_file: Path, build_folder
     assert "  row " in done.stdout
 
 
-def test_json_lists_every_changed_row(set_file: Path, build_folder: Path) -> None:
-    _silence_joints(build_folder)
-    done = thenar("verify", build_folder, set_file, "--json")
-    found = json.loads(done.stdout)
-    assert done.returncode == 1
-    assert found["holds"] is False
-    assert all(row["ensemble"] != row["integers"] for row in found["changed"])
-    assert found["changed"]
-
-
 @pytest.mark.slow
 def test_firmware_is_compiled_and_held_against_python(set_file: Path, build_folder: Path) -> None:
     tool("gcc")

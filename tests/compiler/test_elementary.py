@@ -1,10 +1,4 @@
-"""exp, log, softmax, loss, sine and cosine against the reference; softmax and the loss also in tests/stability.
-
-The bound of 2 ulp of sine and cosine: taking off quarter turns leaves a rest that two subtractions round, each by half
-an ulp at most (the products before them are exact, and where digits cancel nothing is lost). Relative to the result it
-counts for no more, as x cot x <= 1 and x tan x <= 0.8 up to pi/4; the kernels round twice more, by half an ulp each.
-The four never meet in full: the second subtraction takes off less than 2e-18. The worst seen in 160 000 numbers is 1.5.
-"""
+"""Elementary functions as properties; their errors are bounded by the case "elementary" of thenar.stability."""
 
 import hashlib
 
@@ -28,23 +22,12 @@ from thenar.compiler.elementary import (
     softmax_and_loss,
 )
 from thenar.stability.reference import boosting as logistic
-from thenar.stability.reference import numbers as linear
 from thenar.stability.reference.numbers import exact, precisely, ulps
 
 
-@given(st.floats(-708.0, 709.0))
+@given(st.floats(-1e308, 709.0) | st.floats(-746.0, 709.0))
 def test_exp_is_within_one_ulp(x: float) -> None:
     assert ulps(float(exp(np.array([x]))[0]), logistic.exp(x)) <= 1.0
-
-
-@given(st.floats(-1e308, -708.0))
-def test_exp_underflows_gradually_to_nothing(x: float) -> None:
-    assert ulps(float(exp(np.array([x]))[0]), logistic.exp(x)) <= 1.0
-
-
-@given(st.floats(5e-324, 1e308))
-def test_log_is_within_two_ulp(x: float) -> None:
-    assert ulps(float(log(np.array([x]))[0]), logistic.log(x)) <= 2.0
 
 
 def test_exp_and_log_are_exact_at_nought_and_one() -> None:
@@ -53,14 +36,6 @@ def test_exp_and_log_are_exact_at_nought_and_one() -> None:
 
 
 SCORES = arrays(np.float64, (5, 3), elements=st.floats(-800, 800))
-
-
-@given(st.floats(0.0, 744.0), st.integers(2, 5))
-def test_the_loss_of_an_almost_certain_class_keeps_its_bits(lead: float, classes: int) -> None:
-    scores = np.zeros((classes, 1))
-    scores[1:] = -lead
-    _, loss = softmax_and_loss(scores, np.array([0]), None)
-    assert ulps(loss, logistic.loss(tuple(scores[:, 0].tolist()), 0)) <= classes + 5
 
 
 @given(SCORES)
@@ -108,29 +83,6 @@ def test_every_bit_is_what_it_is_on_every_machine(name: str) -> None:
 
 
 FURTHEST = 1000.0
-QUARTERS = 636  # so many quarter turns fit
-
-
-def assert_close(x: float) -> None:
-    sine, cosine = (float(part[0]) for part in sincos(np.array([x])))
-    assert ulps(sine, linear.sin(x)) <= 2.0
-    assert ulps(cosine, linear.cos(x)) <= 2.0
-
-
-@given(st.floats(-FURTHEST, FURTHEST))
-def test_sine_and_cosine_are_within_two_ulp(x: float) -> None:
-    assert_close(x)
-
-
-@given(st.integers(-QUARTERS, QUARTERS), st.integers(-3, 3), st.sampled_from([0.0, 1e-12, 1e-6, 1e-3]))
-def test_so_they_are_beside_their_zeros_where_digits_cancel(quarter: int, steps: int, off: float) -> None:
-    x = quarter * np.pi / 2 + off
-    assert_close(float(x + steps * np.spacing(x)))
-
-
-@given(st.integers(-QUARTERS, QUARTERS - 1))
-def test_so_they_are_where_one_quarter_ends_and_the_next_begins(quarter: int) -> None:
-    assert_close((quarter + 0.5) * np.pi / 2)
 
 
 @given(arrays(np.float64, (3, 2), elements=st.floats(-FURTHEST, FURTHEST)))

@@ -16,6 +16,7 @@ from example_frontier import example_frontier
 from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, make_folder
 from mutating import Mutate, altered, json_file, npz_file, sealed
 
+from thenar.cli.kept import kept_names
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.firmware.generate import firmware_files, sums, write_folder
 from thenar.compiler.frontier.cache import Store
@@ -23,7 +24,6 @@ from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.points import frontier_to_bytes
 from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
-from thenar.compiler.placement.kept import kept_names
 from thenar.compiler.placement.placement import place
 from thenar.compiler.report.frontier import marks_table, notes, points_table
 from thenar.compiler.scan_file import SCAN_NAME, load_scan

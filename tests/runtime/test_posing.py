@@ -36,23 +36,6 @@ def hold(guide: PoseGuide, raw: bytes, now: int = 0) -> PoseStage:
     return guide.stage
 
 
-def through(guide: PoseGuide, first: int = 0) -> None:
-    for number in range(first, len(ALL)):
-        assert guide.pose is ALL[number]
-        hold(guide, bytes([60 + 20 * number] * 18))
-
-
-def test_poses_one_after_the_other_make_the_lines(guide: PoseGuide) -> None:
-    through(guide)
-    assert guide.stage == "done"
-    calibration = guide.calibration("anna")
-    assert {line.name: (line.raw_a, line.raw_b) for line in calibration.sensors} == {
-        name: (60, 60 + 20 * number) for number, pose in enumerate(ALL) for name in pose.degrees if name in SENSORS_18
-    }
-    guide.press(0, "accept")
-    assert (guide.stage, guide.offered(0)) == ("done", {"back"})
-
-
 def test_a_doubtful_pose_is_held_again_or_kept(guide: PoseGuide) -> None:
     hold(guide, bytes([60] * 18))
     assert hold(guide, bytes([60] * 18)) == "doubted"
@@ -64,17 +47,6 @@ def test_a_doubtful_pose_is_held_again_or_kept(guide: PoseGuide) -> None:
     assert hold(guide, bytes([60] * 18)) == "doubted"
     guide.press(0, "keep")
     assert (guide.stage, guide.pose.name) == ("ready", "bent thumb")
-
-
-def test_one_goes_back_pose_by_pose_also_from_the_end(guide: PoseGuide) -> None:
-    assert "back" not in guide.offered(0)
-    through(guide)
-    guide.press(0, "back")
-    assert (guide.stage, guide.pose) == ("ready", ALL[-1])
-    guide.press(0, "back")
-    assert guide.pose is ALL[-2]
-    through(guide, first=len(ALL) - 2)
-    assert guide.stage == "done"
 
 
 def test_saturated_dead_and_unmeasured_sensors_are_told(guide: PoseGuide) -> None:

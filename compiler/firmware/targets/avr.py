@@ -73,7 +73,9 @@ class Avr(Target):
             sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
             objects = compile_objects([*command, *STRICT], sources, folder)
             call([*command, *objects, "-o", "classifier.elf"], folder)
-            found = _symbols(folder)
+            words = map(str.split, call(["avr-nm", "--format=posix", "classifier.elf"], folder).decode().splitlines())
+            # Address and size of the program's symbols, data from 0x800000 on.
+            found = {word[0]: (int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
             size = 2 * layout.tables.n_classes
             if lost is None:
                 given = _symbol(found, "memory", 2 * layout.memory)
@@ -118,13 +120,6 @@ def _built(sources: Path, program: str) -> Path:
             raise FirmwareError("libsimavr not found; Debian: apt-get install libsimavr-dev") from None
         raise
     return built
-
-
-def _symbols(folder: Path) -> dict[str, tuple[int, int]]:
-    """Return address and size of the symbols of the compiled program, data from 0x800000 on."""
-    lines = call(["avr-nm", "--format=posix", "classifier.elf"], folder).decode().splitlines()
-    words = [line.split() for line in lines]
-    return {word[0]: (int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
 
 
 def _symbol(found: Mapping[str, tuple[int, int]], name: str, size: int | None = None) -> int:

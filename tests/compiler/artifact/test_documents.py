@@ -58,13 +58,6 @@ def test_documents_come_and_go_with_the_builds_they_are_of(gloved: GraspSet, tmp
     assert not (build / "spec").exists()
 
 
-def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
-    grasp_set: GraspSet, tmp_path: Path
-) -> None:
-    assert "Their positions are not known: --layout takes a list of them." in _compile(grasp_set, tmp_path / "build")
-    assert not list((tmp_path / "build" / "spec").glob("cutting.*"))
-
-
 def test_the_report_has_the_confusion_of_the_builds_own_folds(gloved: GraspSet, tmp_path: Path) -> None:
     words = _compile(gloved, tmp_path / "build", folds=3, seed=5)
     assert re.search(r"This build's recipe \(placement: .*; trainer: .*\), within subject, 3 nested folds", words)
@@ -142,12 +135,6 @@ def test_switches_of_nobody_knows_which_glove_stand_in_a_grid(grasp_set: GraspSe
     hand, manifest = _drawn(grasp_set, tmp_path / "build", hand_map())
     assert (hand.placed, hand.outline) == (False, ())
     assert [each.name for each in hand.switches] == [switch.name for switch in manifest.switches]
-
-
-def test_a_build_without_switches_draws_its_joints(gloved: GraspSet, tmp_path: Path) -> None:
-    hand, manifest = _drawn(gloved, tmp_path / "build", hand_map(), "joints")
-    assert (hand.switches, hand.outline) == ((), ())
-    assert len(hand.joints) == len(manifest.joints) > 0
 
 
 def test_the_drawing_changes_nothing_but_its_own_seal(gloved: GraspSet, tmp_path: Path) -> None:

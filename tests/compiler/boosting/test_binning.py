@@ -1,7 +1,6 @@
 """Sums left of every split, against a plain loop over rows."""
 
 from collections.abc import Iterator
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -71,17 +70,7 @@ def test_columns_of_two_values_that_share_cells_are_summed_apart(
     check_all_sums(X.astype(np.float64))
 
 
-DOUBLES = st.floats(allow_nan=False, allow_infinity=False)
 LARGE, SMALL = st.floats(1e308, 1.7e308), st.integers(-9, 9).map(lambda units: units * 5e-324)
-
-
-@given(st.tuples(DOUBLES, DOUBLES) | st.tuples(LARGE, LARGE) | st.tuples(SMALL, SMALL))
-def test_a_threshold_is_the_midpoint_correctly_rounded_below_the_upper(pair: tuple[float, float]) -> None:
-    lower, upper = sorted(pair)
-    if lower == upper:
-        return
-    middle = float((Fraction(lower) + Fraction(upper)) / 2)
-    assert midpoints(np.array([lower, upper]))[0] == (middle if middle < upper else lower)
 
 
 @given(MATRICES, st.integers(2, 6))

@@ -52,17 +52,6 @@ def test_scaling_by_a_power_of_two_changes_no_integer(values: np.ndarray, power:
     assert (scaled.exponents[values.any(axis=1)] == exponents[values.any(axis=1)] - power).all()
 
 
-@given(ROWS)
-def test_two_grids_together_keep_90_bits_of_the_sum(values: np.ndarray) -> None:
-    coarse, fine = on_grids(values)
-    for row in range(len(values)):
-        total = sum(Fraction(abs(float(v))) for v in values[row])
-        assert sum(abs(int(v)) for v in fine.units[row]) <= 2**52
-        unit, finer = (Fraction(2) ** -int(grid.exponents[row]) for grid in (coarse, fine))
-        for v, a, b in zip(values[row], coarse.units[row], fine.units[row], strict=True):
-            assert abs(Fraction(float(v)) - int(a) * unit - int(b) * finer) <= total / 2**90
-
-
 @given(ROWS, st.integers(0, 2**32))
 def test_the_sums_of_branches_are_exact_whatever_their_share(values: np.ndarray, seed: int) -> None:
     side = np.random.default_rng(seed).integers(0, 3, size=values.shape)

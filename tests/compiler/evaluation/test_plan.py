@@ -210,14 +210,6 @@ def test_labels_keep_their_numbers_where_some_do_not_occur() -> None:
     assert np.array_equal(found, grasps.labels[fold.test])
 
 
-def test_without_inputs_the_most_frequent_training_label_is_answered() -> None:
-    grasps = make_grasps()
-    rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
-    fold = Fold(rows, np.arange(6), "1")
-    (found,) = predictions(Samples.of(grasps), [FoldFit(fold, (), (), (0, 1, 2, 3))], QUICK)
-    assert found.tolist() == [2] * 6
-
-
 def test_where_no_input_varies_the_most_frequent_training_label_is_answered() -> None:
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])

@@ -5,10 +5,9 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.classifier import CORE_FILES, Library
+from thenar.compiler.firmware.classifier import CORE_FILES
 from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.generate import SUMS, firmware_files, sums, write_folder
-from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 
@@ -69,34 +68,9 @@ def test_nobody_reads_of_inputs_that_there_are_none_of(switches: int, joints: in
         assert re.search(rf"grasp types\s+from {words} of a glove", files[path]), path
 
 
-def test_on_this_machine_no_cycles_of_a_microcontroller_are_told(build: Build) -> None:
-    fit = fit_for(TARGETS["host"], build.tables)
-    assert fit.target.part == "host"
-    assert (fit.words, fit.notes()) == ("for this machine", ())
-
-
-@pytest.mark.parametrize("platform", [name for name, target in TARGETS.items() if target.formula])
-def test_more_flash_than_the_part_has_is_refused(build: Build, platform: str) -> None:
-    part = TARGETS[platform]
-    assert fit_for(TARGETS[platform], build.tables, part.flash).target is part
-    with pytest.raises(FirmwareError, match=f"{part.part} has {part.flash} bytes$"):
-        firmware_files(build.tables, build.manifest, platform, flash=part.flash + 1)
-
-
 def test_a_part_is_never_chosen_beyond_its_flash(build: Build) -> None:
     fit = fit_for(TARGETS["arduino"], build.tables, 1 << 20)
     assert fit.target.part == "atmega328p"
-
-
-def test_notes_stand_in_the_opening_of_the_header(build: Build) -> None:
-    library = Library("glove", build.manifest, Layout(build.tables), ("measured on a rainy day",))
-    assert "measured on a rainy day" in TARGETS["avr328p"].files(library)["thenar_glove.h"].split("*/")[0]
-
-
-@pytest.mark.parametrize("platform", ["avr328p", "cortex-m4", "arduino"])
-def test_too_little_flash_is_refused(build: Build, platform: str) -> None:
-    with pytest.raises(FirmwareError, match=r"takes about \d+ bytes of flash"):
-        firmware_files(build.tables, build.manifest, platform, flash=500)
 
 
 @pytest.mark.slow
@@ -132,15 +106,6 @@ def test_a_new_or_empty_folder_takes_the_files_and_their_sums(tmp_path: Path) ->
         assert content(folder) == {**NEW, SUMS: sums(NEW)}
         subprocess.run([tool("sha256sum"), "--check", "--strict", "--quiet", SUMS], cwd=folder, check=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "new"]
-
-
-def test_firmware_is_replaced_only_where_that_is_asked_for(folder: Path) -> None:
-    with pytest.raises(FirmwareError, match="already holds firmware: name another folder, or add ``overwrite``"):
-        write_folder(NEW, folder)
-    assert content(folder) == {**OLD, SUMS: sums(OLD)}
-    write_folder(NEW, folder, overwrite=True)
-    assert content(folder) == {**NEW, SUMS: sums(NEW)}
-    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
 
 
 def test_what_was_changed_since_is_not_replaced(folder: Path) -> None:

@@ -81,17 +81,6 @@ def test_a_wrong_switch_bit_fails_the_check(make: Make) -> None:
     assert "predictions differ from Python's" in done.stdout + done.stderr
 
 
-def test_make_builds_says_the_size_and_cleans_up(make: Make, tmp_path: Path) -> None:
-    tables = make_tables()
-    files = files_for(Layout(tables), describe(tables))
-    assert make(files).returncode == 0
-    assert (tmp_path / "libthenar_hand.a").exists()
-    size = make({}, "size")
-    assert size.stdout.split()[:4] == ["text", "data", "bss", "dec"]
-    assert make({}, "clean").returncode == 0
-    assert {path.name for path in tmp_path.iterdir()} == files.keys()
-
-
 @pytest.mark.parametrize("changed", ["thenar_hand.c", "thenar_hand.h", "thenar_hand_check.h"])
 def test_what_a_changed_file_is_part_of_is_made_again(make: Make, changed: str) -> None:
     tables = make_tables()

@@ -20,7 +20,7 @@ from thenar.compiler.frontier.cache import stored
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.picked import picked
 from thenar.compiler.frontier.plots import picture
-from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint, frontier_from_bytes
+from thenar.compiler.frontier.points import Frontier, FrontierError, FrontierPoint
 from thenar.compiler.frontier.price import fit_here
 from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, choose_settings
@@ -35,7 +35,6 @@ from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS
 from thenar.compiler.trainers.logitboost import boost
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.drivers.errors import SettingError
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.scores import Scorer
 
@@ -195,11 +194,6 @@ def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path) -> None
         assert point.rate.mean < 1
 
 
-def test_it_is_written_as_it_is_returned(first: tuple[Request, Frontier]) -> None:
-    request, found = first
-    assert frontier_from_bytes((request["output"] / "frontier.json").read_bytes()) == found
-
-
 def test_without_a_folder_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",))).points
@@ -268,11 +262,6 @@ def test_a_search_that_is_refused_leaves_no_folder_and_no_file(tmp_path: Path) -
             found_of(asked(folder, make_set(), target="nonsense"))
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert list((tmp_path / "out").iterdir()) == []
-
-
-def test_an_unknown_method_is_told(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match="there is no placement method 'nonsense'"):
-        found_of(asked(tmp_path, make_set(), methods=("nonsense",)))
 
 
 def test_compile_makes_what_a_point_of_each_trainer_says(tmp_path: Path) -> None:

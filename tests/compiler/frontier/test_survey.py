@@ -11,18 +11,14 @@ from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.frontier.cache import question
 from thenar.compiler.frontier.search import SHAPES, Search
 from thenar.compiler.frontier.survey import Cuts, FoldHits, fit_stages
-from thenar.compiler.model.collapse import collapse
 from thenar.compiler.placement.elements import Element
 from thenar.compiler.placement.placement import InputSelection
 from thenar.compiler.placement.ports import PortCosts
-from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.logitboost import boost
-from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.recipe import Recipe
-from thenar.runtime.scores import Scorer
 
 from ..conftest import make_set
 
@@ -71,21 +67,6 @@ def test_every_stage_is_as_if_trained_for_it_alone(grasp_set: GraspSet, cuts: Cu
         assert correct == np.packbits((answers == samples.labels[fold.test])[np.argsort(fold.test)]).tobytes()
 
 
-def test_tables_answer_as_they_will_when_deployed(samples: Samples, cuts: Cuts) -> None:
-    fold, stages = cuts.screening[0], (2, 6)
-    fit = fit_of(samples, cuts, stages)
-    X, switches = samples.keeping(COLUMNS).inputs, len(COLUMNS)
-    bits, codes = X[:, :switches].astype(bool), X[:, switches:]
-    for stage, row in zip(stages, fit.tables, strict=True):
-        stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=stage)
-        for shape, correct in zip(SHAPES, row, strict=True):
-            scores = collapse(stumps, switches)
-            scorer = Scorer(quantise(scores, bits[fold.train], codes[fold.train], shape.width, shape.table_bits))
-            lanes = [scorer.biased_scores(bits[test], codes[test]) for test in fold.test]
-            answers = [lane.index(max(lane)) for lane in lanes]
-            assert counted(correct) == np.count_nonzero(answers == samples.labels[fold.test])
-
-
 def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_set: GraspSet, cuts: Cuts) -> None:
     samples, fold = Samples.of(grasp_set, "switches"), cuts.screening[0]
     fit = fit_of(samples, cuts, (1, 3), columns=())
@@ -96,14 +77,6 @@ def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_s
     assert [len(row) for row in fit.tables] == [len(SHAPES)] * 2
 
 
-def test_a_path_holds_the_placement_of_every_parameter(samples: Samples, cuts: Cuts) -> None:
-    rows, prunes = cuts.screening[0].train, (0.0, 10.0, 40.0)
-    path = choose_path(samples, rows, Recipe(), prunes, tuple(map(Element, range(14))))
-    X, y = samples.switches[rows], samples.labels[rows]
-    trees = [grow_id3(X, y, min_samples=int(prune)) for prune in prunes]
-    assert path == tuple(tuple(map(Element, tree.inputs)) for tree in trees)
-
-
 def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -> None:
     one, two = (0,) * 13 + (1,), (0,) * 12 + (1, 1)
     several = (((0,) * 14, (1.0,)), ((0,) * 14, (2.0,)), (one, (1.0, 1.0)), (two, (1.0, 1.0)))
@@ -112,12 +85,6 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     asked = {question(choose_path, (samples, folds[0].train, Recipe(), (0.0,), (), ports), {}) for ports in costs}
     asked |= {question(fit_stages, (samples, fold, kept((0,)), (1,), (), (), SEARCH.training), {}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
-
-
-def frames_of(grasp_set: GraspSet, each: int) -> GraspSet:
-    """Return the set with every row `each` times, the frames of one trial; in another order."""
-    rows = np.random.default_rng(5).permutation(np.repeat(np.arange(len(grasp_set)), each))
-    return grasp_set.rows(rows)
 
 
 def test_left_out_subjects_are_untrained_and_grouped_into_ten_folds() -> None:
@@ -147,14 +114,6 @@ def test_every_fold_tests_rows_that_it_does_not_train_on() -> None:
         assert len((*cuts.screening, *cuts.others)) == repeats * SEARCH.folds + 2
         for fold in (*cuts.screening, *cuts.others):
             assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(len(grasp_set)))
-
-
-def test_no_trial_is_parted() -> None:
-    grasp_set = frames_of(make_set(subjects=2), 5)
-    cuts = cuts_of(grasp_set)
-    assert (len(cuts.trials), len(cuts.people)) == (480, 96)
-    for fold in (*cuts.screening, *cuts.others):
-        assert set(cuts.trials[fold.train]).isdisjoint(cuts.trials[fold.test])
 
 
 def test_a_trial_is_recognised_as_most_of_its_frames_are() -> None:

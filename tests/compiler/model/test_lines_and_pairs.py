@@ -142,26 +142,6 @@ def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
         assert (left == scores[row]).all()
 
 
-@settings(deadline=None, max_examples=25)
-@given(seed=seeds, entry_bits=entries)
-def test_no_partial_sum_of_any_code_leaves_the_bound(seed: int, entry_bits: int) -> None:
-    tables, bits, rows = with_lines(seed, widest=400)
-    integers = quantise(tables, bits, rows, entry_bits=entry_bits)
-    codes = np.arange(800).astype(np.uint16)
-    for sign in (1, -1):
-        reached = np.maximum(sign * integers.bias.astype(int), 0)
-        reached += (
-            np.maximum(sign * np.stack([integers.switch_rows, integers.switch_means]).astype(int), 0).max(0).sum(0)
-        )
-        for joint, mean in enumerate(integers.joint_means.astype(int)):
-            each = np.maximum(sign * integers.joint_rows[joint].astype(int), 0)
-            each = each[np.searchsorted(integers.thresholds[joint], codes)]
-            for slope in integers.lines:
-                each = each + np.maximum(sign * slope.of(codes), 0) * (slope.joint == joint)
-            reached += np.maximum(each.max(axis=0), sign * mean)
-        assert reached.max() <= integers.bound
-
-
 @given(seed=seeds)
 def test_rows_of_a_byte_are_upper_halves_of_steps_and_no_coarser(seed: int) -> None:
     tables, bits, codes = with_lines(seed)

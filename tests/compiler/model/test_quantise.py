@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import compare
-from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables, tables_to_bytes
+from thenar.runtime.model.integers import FINEST_SCALE, IntegerTables
 from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import (
     GROUP_SIZE,
@@ -148,25 +148,6 @@ def test_means_stand_for_the_rows_trained_on(seed: int) -> None:
     for joint, mean in enumerate(integers.joint_means):
         rows = integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes[:, joint])]
         assert np.abs(mean - rows.mean(axis=0)).max() <= 1.0 + FLOATS
-
-
-@given(seed=st.integers(0, 100))
-def test_the_order_of_the_rows_changes_no_byte(seed: int) -> None:
-    tables, (bits, codes) = collapse(make_stumps(seed), 6), make_rows(seed)
-    order = np.random.default_rng(seed).permutation(len(bits))
-    shuffled = quantise(tables, bits[order], codes[order])
-    assert tables_to_bytes(shuffled) == tables_to_bytes(quantise(tables, bits, codes))
-
-
-@pytest.mark.parametrize("width", [16, 8])
-def test_no_frame_at_all_overflows(width: int) -> None:
-    integers = quantise(collapse(make_stumps(3, switches=4, joints=2), 4), *make_rows(switches=4, joints=2), width)
-    limit, partial = 2 ** (width - 1) - 1, {tuple(integers.bias.tolist())}
-    terms = [[row, 0 * row] for row in integers.switch_rows.astype(int)]
-    terms += [list(rows.astype(int)) for rows in integers.joint_rows]
-    for choices in terms:
-        partial = {tuple(np.add(sum_, choice).tolist()) for sum_ in partial for choice in choices}
-        assert max(abs(lane) for sum_ in partial for lane in sum_) <= limit
 
 
 @given(seed=st.integers(0, 1000), shrinkage=st.sampled_from([1e-5, 1e-8, 1e-10, 1e-12, 1e-200]))

@@ -69,16 +69,6 @@ def test_what_stands_in_lies_within_what_the_input_adds(seed: int, n: int, joint
     assert (after.bound, after.scale) == (before.bound, before.scale)
 
 
-@given(seed=st.integers(0, 30))
-def test_the_order_of_the_rows_is_no_matter(seed: int) -> None:
-    bits, codes, labels = _rows(seed, 1500, joints=2)
-    tables, fitted = _both(make_stumps(seed, classes=K, switches=SWITCHES, joints=2), (bits, codes, labels))
-    order = np.random.default_rng(seed).permutation(len(labels))
-    again = fit_lost(tables, bits[order], codes[order], labels[order])
-    assert np.array_equal(fitted.switch_means, again.switch_means)
-    assert np.array_equal(fitted.joint_means, again.joint_means)
-
-
 def test_neither_is_it_where_millions_of_rows_are_added_up() -> None:
     random = np.random.default_rng(5)
     scores, often = random.integers(-900, 900, (300, K)), random.integers(1, 1_000_000, 300).astype(np.float64)

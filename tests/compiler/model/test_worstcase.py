@@ -1,6 +1,6 @@
 import tracemalloc
 from fractions import Fraction
-from itertools import permutations, product
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -14,48 +14,9 @@ from thenar.runtime.model.proof import Rounding, _Pairs
 from thenar.runtime.model.quantise import quantise, rounding_error
 from thenar.runtime.model.tables import ScoreTables
 
-from .conftest import UNIT, exact_scores, lost_in_parts, make_rows, make_stumps
+from .conftest import make_rows, make_stumps
 
 widths = st.sampled_from([4, 5, 6, 8, 16])
-
-
-def _every_frame(tables: ScoreTables) -> tuple[np.ndarray, np.ndarray]:
-    """Return frames of all bits, and of codes on both sides of all thresholds."""
-    codes = [sorted({0, 65535, *(int(t) for t in steps), *(int(t) + 1 for t in steps)}) for steps in tables.thresholds]
-    frames = [*product(product((False, True), repeat=len(tables.switch_rows)), product(*codes))]
-    return np.array([bits for bits, _ in frames]), np.array([at for _, at in frames], np.uint16)
-
-
-def _small(seed: int, width: int) -> tuple[ScoreTables, IntegerTables]:
-    tables = collapse(make_stumps(seed, rounds=4, classes=3, switches=3, joints=2), 3)
-    return tables, quantise(tables, *make_rows(seed, switches=3, joints=2), width)
-
-
-@settings(deadline=None, max_examples=40)
-@given(seed=st.integers(0, 10_000), width=widths)
-def test_of_all_frames_none_loses_more_and_the_witness_as_much(seed: int, width: int) -> None:
-    tables, integers = _small(seed, width)
-    rounding = Rounding(tables, integers)
-    lost, parts = lost_in_parts(tables, integers, *_every_frame(tables))
-    for leader, competitor in permutations(range(3), 2):
-        frame = rounding.worst(leader, competitor)
-        assert (frame.leader, frame.competitor) == (leader, competitor)
-        assert frame.loss == Fraction(max(lost[:, leader] - lost[:, competitor]), parts)
-        own, _ = lost_in_parts(tables, integers, frame.bits[np.newaxis], frame.codes[np.newaxis])
-        assert frame.loss == Fraction(own[0, leader] - own[0, competitor], parts)
-    assert rounding.worst_of_all().loss == max(rounding.worst(*pair).loss for pair in permutations(range(3), 2))
-
-
-@settings(deadline=None, max_examples=40)
-@given(seed=st.integers(0, 10_000), width=st.sampled_from([4, 5, 6]))
-def test_no_frame_with_more_than_the_safe_margin_changes_class(seed: int, width: int) -> None:
-    tables, integers = _small(seed, width)
-    safe = Rounding(tables, integers).safe_margin()
-    frames = _every_frame(tables)
-    scores = exact_scores(tables, *frames)
-    changed = scores.argmax(axis=1) != integers.scores(*frames).argmax(axis=1)
-    for second, best in np.sort(scores[changed], axis=1)[:, -2:].tolist():
-        assert (best - second) * UNIT * Fraction(integers.scale) <= safe
 
 
 @given(seed=st.integers(0, 10_000), width=widths)

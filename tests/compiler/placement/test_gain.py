@@ -16,7 +16,6 @@ from thenar.compiler.placement.gain import (
     gain_bits,
     sign_of_log_sum,
 )
-from thenar.stability.reference.information import compare_gains
 
 tables = arrays(np.int64, st.tuples(st.integers(1, 5), st.integers(2, 4)), elements=st.integers(0, 30))
 
@@ -43,19 +42,6 @@ def test_the_smallest_gain_of_all_is_chosen_over_none(m: int) -> None:
     assert best_position(node_of(nothing, least), np.array([0, 1])) == 1
     assert best_position(node_of(nothing, nothing, least, least), np.array([0, 1, 3, 2])) == 3
     assert gain_bits(least) > 0.0
-
-
-@given(st.lists(arrays(np.int64, (3, 2), elements=st.integers(0, 12)), min_size=2, max_size=5))
-def test_the_best_of_small_tables_is_the_first_that_no_other_exceeds(inputs: list[Counts]) -> None:
-    totals = np.maximum.reduce([table.sum(axis=1) for table in inputs])
-    for table in inputs:
-        table[:, 0] += totals - table.sum(axis=1)
-    wanted = None
-    for i in (i for i, table in enumerate(inputs) if table.sum(axis=0).all()):
-        if wanted is None or compare_gains(inputs[i].tolist(), inputs[wanted].tolist()) > 0:
-            wanted = i
-    numbers = np.arange(len(inputs))
-    assert best_position(node_of(*inputs), numbers) == wanted
 
 
 @pytest.mark.parametrize(

@@ -103,16 +103,6 @@ def test_many_rows_and_a_subtracted_sibling_make_the_tree_of_direct_counts() -> 
             subsets[child] = rows[X[rows, node.input] == value]
 
 
-def test_exclusive_or_is_solved_and_said() -> None:
-    X = [[0, 0], [0, 1], [1, 0], [1, 1]]
-    tree = grow_id3(X, [0, 1, 1, 0])
-    assert tree.predict(X).tolist() == [0, 1, 1, 0]
-    assert tree.inputs == (0, 1)
-    assert tree.gains == (0.0, 1.0)
-    assert tree.n_zero_gain == 1
-    assert "at 1 node no input gains anything alone" in tree.text()
-
-
 def test_a_mixed_leaf_predicts_the_majority_ties_the_lowest_class() -> None:
     X = np.array([[0]] * 3 + [[1]] * 4)
     tree = grow_id3(X, ["b", "a", "b", "c", "b", "b", "c"])

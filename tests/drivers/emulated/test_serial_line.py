@@ -75,9 +75,6 @@ def test_what_nobody_took_is_not_made_up_for_in_a_burst() -> None:
     assert drained(outgoing, 3.004) == b"b" * 4
 
 
-EVERY_BYTE = bytes(range(256))
-
-
 @pytest.fixture
 def link(tmp_path: Path) -> Path:
     return tmp_path / "port"
@@ -91,20 +88,6 @@ def line(link: Path) -> Iterator[PtyLine]:
 
 def opened(link: Path, baud: int = 115200) -> serial.Serial:
     return serial.serial_for_url(str(link), baud, timeout=5, exclusive=True)
-
-
-def test_every_byte_passes_both_ways(line: PtyLine, link: Path) -> None:
-    heard: Queue[bytes] = Queue()
-    line.receive = heard.put
-    with opened(link) as port:
-        line.send(EVERY_BYTE)
-        assert port.read(256) == EVERY_BYTE
-        port.write(EVERY_BYTE)
-        received = b""
-        while len(received) < 256:
-            received += heard.get(timeout=60)
-        assert received == EVERY_BYTE
-    assert line.sent_bytes == 256
 
 
 @pytest.mark.parametrize("baud", [9600, 38_400, 115_200])
@@ -138,26 +121,6 @@ def test_an_unplugged_port_dies_under_its_client_and_its_link_is_gone(line: PtyL
             port.write(b"x")
     line.send(b"into the air")
     assert line.dropped_messages == 1
-
-
-def test_a_reader_that_waits_when_the_port_is_unplugged_is_woken(line: PtyLine, link: Path) -> None:
-    outcome: Queue[Exception | bytes] = Queue()
-    waiting = threading.Event()
-
-    def read(port: serial.Serial) -> None:
-        waiting.set()
-        try:
-            outcome.put(port.read(1))
-        except serial.SerialException as error:
-            outcome.put(error)
-
-    with opened(link) as port:
-        reader = threading.Thread(target=read, args=(port,))
-        reader.start()
-        waiting.wait(5)
-        line.unplug()
-        assert isinstance(outcome.get(timeout=4), serial.SerialException)
-        reader.join()
 
 
 def test_a_replugged_port_stands_under_the_same_link_and_forgets_what_waited(link: Path) -> None:

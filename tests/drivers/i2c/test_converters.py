@@ -110,6 +110,10 @@ def placed(bus: I2cBus, ports: Sequence[Port], harness: Harness) -> list[PlacedP
     return [PlacedPort(bus.chips[port.chip], reading_of(port, harness)) for port in ports]
 
 
+EXPANDERS = {
+    **{"mcp23017": 0x20, "mcp23008": 0x21, "tca6424a": 0x22, "pcf8574": 0x23},
+    **{"pcf8575": 0x24, "pca9555": 0x25, "tca9555": 0x26, "pcf8574a": 0x38},
+}
 PLACES: dict[str, list[Place]] = {
     "two converters and expanders": [
         ("ads1115", 0x48, None, None),
@@ -126,6 +130,10 @@ PLACES: dict[str, list[Place]] = {
         ("ads1115", 0x49, 0x71, 2),
     ],
     "one": [("ads1115", 0x4B, None, None)],
+    "every expander": [(kind, address, None, None) for kind, address in EXPANDERS.items()],
+    "every expander behind channels": [
+        (kind, address, 0x70 + n % 2, n) for n, (kind, address) in enumerate(EXPANDERS.items())
+    ],
 }
 
 
@@ -149,7 +157,7 @@ def test_a_scan_takes_the_planned_time_and_gives_every_code(
             reads = bus.prepare(placed(bus, ports, harness))
             reads.read()
             before, found = world.now, reads.read()
-        assert (world.now - before) * 1e6 == pytest.approx(scan_us(scan, harness).us, abs=0.01)
+        assert (world.now - before) * 1e6 == pytest.approx(scan_us(scan, harness).us, rel=0, abs=1e-4)
         for port, code in zip(ports, found, strict=True):
             if port.levels:
                 assert code == codes[port.chip][reading_of(port, harness).pins[0]]

@@ -80,18 +80,3 @@ def test_damaged_bytes_give_no_wrong_answer_and_cease_with_repair(
         assert scene.check() > 0
     assert set(running.opened()) == {1}
     assert running.damaged(line) > 0 or damage in (drop, flood)
-
-
-def test_a_glove_asked_for_too_much_runs_at_its_rate(run: MakeRun) -> None:
-    """Its records end in 'es': they are measurements all the same, and none of them is taken for late."""
-    running = run("both", "glove", "board", glove="rate_hz = 1000")
-    scene = running.scene
-    scene.settled(0)
-    begin_us = running.now_us()
-    for row in (4, 9):
-        scene.show(row)
-        scene.settled(row)
-    assert running.counts("cyberglove")["too fast"] > 0
-    since = scene.grasps.since(begin_us)
-    assert sum(grasp.health == "ok" for grasp in since) > 0.9 * len(since)
-    assert scene.check() > 0

@@ -86,13 +86,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ),
         ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is not the path of a device, such as"),
         ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is not the path of a device"),
-        ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: must be a whole number, not 'fast'"),
         ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),
-        ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),
-        (
-            "[cyberglove]\nport = 'x'\nrate_khz = 1",
-            "line 3: cyberglove.rate_khz: this key is unknown (did you mean 'rate_hz",
-        ),
         ("[cyberglove]\nport = 'x'\nrate_hz = nan", "line 3: cyberglove.rate_hz: must be a finite number"),
         (
             "[cyberglove]\nport = 'x'\njoints = ['a']",
@@ -106,6 +100,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
             f"[cyberglove]\nport = 'x'\njoints = {['', 'a'] * 9}",
             "line 3: cyberglove.joints[3]: sensor 'a' is already cyberglove.joints[1]",
         ),
+        ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),
         ("[[steam]]", "line 1: steam: this key is unknown (did you mean 'stream'?)"),
         ("[[stream]]\nport = 'x'", "line 1: stream[0]: must have one of the keys switches, joints and taxels"),
         (
@@ -122,8 +117,6 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ),
         (BUS + BUS, "line 4: bus[1].device: /dev/i2c-1 is already bus[0].device"),
         (BUS + "clock_hz = 5", "line 3: bus[0].clock_hz: must be at least 1000, not 5"),
-        ("bus = 3", "line 1: bus: must be a list, not 3"),
-        ("[bus]", "line 1: bus: must be a list, not a table"),
     ],
 )
 def test_faults_of_lines_and_buses_name_their_place(load: Load, text: str, message: str) -> None:
@@ -138,26 +131,21 @@ def test_faults_of_lines_and_buses_name_their_place(load: Load, text: str, messa
             "kind = 'mcp23017'\naddress = 0x28",
             "line 5: bus[0].chip[0].address: a mcp23017 is at 0x20 to 0x27, not",
         ),
-        ("kind = 'mcp23017'\naddress = -1", "line 5: bus[0].chip[0].address: a mcp23017 is at 0x20 to 0x27, not"),
         (
             "pins = { GPA8 = 's' }",
             "bus[0].chip[0].pins.GPA8: a mcp23017 has no pin 'GPA8' (did you mean 'GPA6' or 'GPA5' or 'GPA4'?)",
         ),
         ("pins = { GPA7 = 's' }", "bus[0].chip[0].pins.GPA7: must not be an input: since revision D of its data sheet"),
-        ("pins = { GPB7 = 's' }", "bus[0].chip[0].pins.GPB7: must not be an input"),
         ("kind = 'mcp23008'\npins = { GP7 = 's' }", "bus[0].chip[0].pins.GP7: must not be an input"),
         ("pins = { GPA0 = '' }", "bus[0].chip[0].pins.GPA0: '' is not a valid name of a switch: it is empty"),
-        ("pins = { GPA0 = 3 }", "bus[0].chip[0].pins.GPA0: must be text, not 3"),
-        ("pins = { GPA0 = 'a', GPA0 = 'b' }", "glove.toml is not valid TOML: "),
         (
             "pins = { GPA0 = 'a', GPA1 = 'a' }",
             "bus[0].chip[0].pins.GPA1: switch 'a' is already bus[0].chip[0].pins.GPA0: wire it in one place",
         ),
-        ("kind = 'pcf8574'\nclosed = 'high'", "bus[0].chip[0].closed: a pcf8574 pulls its inputs up"),
         ("closed = 'lo'", "bus[0].chip[0].closed: 'lo' is not among its values (did you mean 'low'"),
+        ("kind = 'pcf8574'\nclosed = 'high'", "bus[0].chip[0].closed: a pcf8574 pulls its inputs up"),
         ("mux = { address = 0x78, channel = 0 }", "bus[0].chip[0].mux.address: must be at most 119, not 120"),
         ("mux = { address = 0x70, channel = 8 }", "bus[0].chip[0].mux.channel: must be at most 7, not 8"),
-        ("mux = { address = 0x70 }", "bus[0].chip[0].mux: the key channel is missing"),
     ],
 )
 def test_what_is_wrong_with_a_chip_is_told_with_its_place(load: Load, chip: str, message: str) -> None:

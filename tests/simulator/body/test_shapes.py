@@ -6,7 +6,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere, rotation, rotation_vector
@@ -175,18 +174,6 @@ def test_nothing_reaches_beyond_the_extent_and_something_reaches_it(shape: Shape
     for axis, size in enumerate(shape.extent_mm()):
         tip = np.eye(3)[axis] * size / 2
         assert at(shape, np.array([tip, -tip]))[0] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_the_least_distance_of_two_scipy_finds_too() -> None:
-    # A point off a rounded edge, by scipy's own way: the nearest point with no negative slack in the rounded box.
-    box, point = Box(60.0, 40.0, 20.0, 4.0), np.array([40.0, 25.0, 3.0])
-    inner = np.array([26.0, 16.0, 6.0])
-
-    def square(core: np.ndarray) -> float:
-        return float(np.sum((core - point) ** 2))
-
-    found = minimize(square, np.zeros(3), bounds=list(zip(-inner, inner, strict=True)))
-    assert at(box, point[None])[0][0] == pytest.approx(np.sqrt(found.fun) - 4.0, abs=1e-5)
 
 
 @given(SHAPES, arrays(np.float64, (3, 3, 6), elements=st.floats(-80.0, 80.0)))

@@ -10,9 +10,7 @@ import pytest
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.report import SimulationReport
-from thenar.simulator.pipeline.simulation import Simulation, sessions
-from thenar.simulator.pipeline.steps import Ledger, compile_pipeline
-from thenar.simulator.planning.postures import Postures
+from thenar.simulator.pipeline.simulation import Simulation
 from thenar.simulator.scenes.scene import ListedEffect, Scene
 
 
@@ -63,20 +61,6 @@ def test_timed_and_wired_scenes_do_not_depend_on_blocks(name: str) -> None:
         # What is drawn once a batch is drawn more often in more batches; nothing else differs.
         same = [msgspec.structs.replace(without_times(each.report), steps=()) for each in (part, whole)]
         assert same[0] == same[1]
-
-
-def test_one_repetition_alone_is_as_in_the_whole_scene(quick: Simulation) -> None:
-    pipeline, made = compile_pipeline(QUICK), quick.grasp_set
-    for session in sessions(QUICK, Postures.shipped(QUICK.taxonomy)):
-        for place, condition in enumerate(session.conditions):
-            batch = session.batch(place, np.array([2]))
-            pipeline.run([batch], Ledger())
-            (row,) = np.flatnonzero((made.subjects == condition.subject) & (made.trials == batch.trials[0]))
-            np.testing.assert_array_equal(made.switches[row], batch.bits[0, 0])
-            angles = [joint.value(code) for joint, code in zip(made.joints, made.codes[row], strict=True)]
-            # Half a count of the subject's sensors (at most 1.4 degrees and an eighth more), half a step of the scale.
-            assert np.abs(angles - batch.sensors_deg[0, 0, :16]).max() < 1.4 * 1.125 / 2 + 0.25
-            assert (made.grasps[row], made.objects[row]) == (condition.grasp, condition.thing.name)
 
 
 def test_a_subject_alone_is_as_in_the_whole_scene(quick: Simulation) -> None:

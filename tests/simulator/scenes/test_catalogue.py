@@ -61,18 +61,9 @@ def test_other_tables_of_a_catalogue_are_not_its_business(tmp_path: Path) -> Non
     ("old", "new", "message"),
     [
         ('grasp = "Tip"', 'grasp = "Tipp"', "line 70: objects[11].grasp: 'Tipp' is not a grasp type of kamakura14"),
-        ("mass_g = 40", "mass_kg = 0.04", "line 5: objects[0].mass_kg: this key is unknown (did you mean 'mass_g"),
-        ("mass_g = 40", "", "line 2: objects[0]: the key mass_g is missing"),
-        (
-            "diameter_mm = 50",
-            "diameter_cm = 5",
-            "line 7: objects[0].diameter_cm: this key is unknown (did you mean 'diameter_mm",
-        ),
-        ("diameter_mm = 50", "diameter_mm = -50", "line 7: objects[0].diameter_mm: must be above 0, not -50"),
         ("diameter_mm = 50", "diameter_mm = nan", "line 7: objects[0].diameter_mm: must be a finite number, not nan"),
         ("diameter_mm = 50", "diameter_mm = 300", "line 2: objects[0]: no hand holds an object of more than 200 mm"),
         ("diameter_mm = 50", "length_mm = 50", "line 7: objects[0].length_mm: this key is unknown"),
-        ("diameter_mm = 50", "", "line 2: objects[0]: the key diameter_mm is missing"),
         (
             'shape = "sphere"',
             'shape = "spere"',
@@ -86,7 +77,6 @@ def test_other_tables_of_a_catalogue_are_not_its_business(tmp_path: Path) -> Non
         ),
         ('name = "for PoH"', 'name = "for PoS"', "line 9: objects[1].name: 'for PoS' is taken (line 2)"),
         ('name = "for PoH"', 'name = " "', "line 9: objects[1].name: ' ' begins or ends with a blank"),
-        ('name = "for PoH"', "name = 3", "line 9: objects[1].name: must be text, not 3"),
         ('grasp = "Tip"', 'grasp = "PoS"', "line 2: objects: no object for Tip: every type of kamakura14 needs one"),
         ('"kamakura14"', '"kamakura"', "line 1: taxonomy: no taxonomy is called 'kamakura': take one of kamakura14"),
         (

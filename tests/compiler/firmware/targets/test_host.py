@@ -1,6 +1,4 @@
 from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -70,12 +68,3 @@ def test_a_program_that_answers_too_few_frames_is_an_error(files: Files) -> None
     early = {"early.c": "#include <stdlib.h>\n__attribute__((constructor)) static void leave(void) { exit(0); }\n"}
     with pytest.raises(FirmwareError, match="printed 0 names for 5 grasp types"):
         HOST.run(made | early, "hand", layout, np.zeros((2, 8), np.uint8))
-
-
-def test_a_missing_compiler_is_named_with_its_package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    layout = Layout(make_tables())
-    with pytest.raises(FirmwareError, match="gcc or clang not found; Debian: apt-get install gcc"):
-        HOST.run({}, "hand", layout, np.zeros((1, 8), np.uint8))
-    with pytest.raises(FirmwareError, match="clang not found; Debian: apt-get install clang"):
-        replace(HOST, compiler=(("clang",), "clang")).run({}, "hand", layout, np.zeros((1, 8), np.uint8))

@@ -93,15 +93,6 @@ def test_cycles_of_an_avr_are_foretold_within_ten_percent() -> None:
         assert fit.cost.cycles == pytest.approx(count_steps(tables_to_bytes(tables), ClassifyModel("avr328p")), rel=0.1)
 
 
-def test_a_target_without_tools_names_what_is_missing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv("PATH", "/nowhere")
-    reason = ClassifyModel("avr328p").unmeasured
-    assert "avr-gcc" in reason
-    assert "apt-get install" in reason
-
-
 def test_a_raspberry_pi_is_not_timed_elsewhere() -> None:
     assert "no Raspberry Pi" in ClassifyModel("pi", python=PYTHON).unmeasured
     assert not ClassifyModel("host", python=PYTHON).unmeasured

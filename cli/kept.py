@@ -5,11 +5,10 @@ from typing import Any
 
 import msgspec
 
+from thenar.compiler.samples import TrainingError
 from thenar.runtime.build import load_manifest
 from thenar.runtime.files import read_file
 from thenar.runtime.names import fault, shortened
-
-from ..samples import TrainingError
 
 _LARGEST_LIST = 4_000_000  # bytes; a placement of the largest set has fewer
 _WANTED = "name a build folder, a file of `thenar place -o`, or a text file with one name per line"
