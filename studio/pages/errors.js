@@ -114,7 +114,9 @@ function matrix(trials) {
     label.title = name;
     return label;
   });
-  const numbers = (some, label, kind) => button(some.length, () => select(some), { class: "plain", "aria-label": label, "data-is": kind });
+  const numbers = (some, label, kind) => {
+    return button(some.length, () => select(some), { class: "plain", "aria-label": label, "data-is": kind });
+  };
   fillTable("confusion", ["", ...heads], trials.flatMap((those, truth) => {
     if (!those.length) return [];
     const name = type(truth), wrong = those.filter(misread), title = numbers(wrong, `${name}: select its ${wrong.length} errors`, "");
@@ -181,7 +183,8 @@ function pairOf(trials) {
 function showTrials({ trials, typical }) {
   const first = !$("trials").children.length, cards = trials.map((one) => card(one, typical));
   const usual = pairOf(selected).map(type).filter((name) => first && typical[name]).map((name) => {
-    return make("figure", { class: "boxed" }, make("figcaption", {}, tag(styles, name), ", typically"), ...hand(typical[name], [], `${name}, typically`));
+    const caption = make("figcaption", {}, tag(styles, name), ", typically");
+    return make("figure", { class: "boxed" }, caption, ...hand(typical[name], [], `${name}, typically`));
   });
   $("trials").append(...(cards.length === 1 ? [...cards, ...usual] : [...usual, ...cards]));
 }
