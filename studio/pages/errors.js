@@ -214,7 +214,7 @@ function hand(shown, decisive, words) {
   const svg = draw("svg", { role: "img", "aria-label": `hand: ${words}` });
   // Drawn when it is nearly on the screen: before, it has no width, and thousands would take long.
   watcher.observe(svg);
-  waiting.set(svg, () => {
+  svg.paint = () => {
     const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
     const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
     const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
@@ -225,16 +225,15 @@ function hand(shown, decisive, words) {
       spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
     }
     svg.setAttribute("aria-label", `hand: ${words}`);
-  });
+  };
   return [svg];
 }
 
-const waiting = new WeakMap();
 const watcher = new IntersectionObserver((entries) => {
   for (const { target, isIntersecting } of entries) {
     if (!isIntersecting) continue;
     watcher.unobserve(target);
-    waiting.get(target)();
+    target.paint();
   }
 }, { rootMargin: "300px" });
 
