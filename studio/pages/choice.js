@@ -1,5 +1,5 @@
 // What pages of the studio share: the sensors that are in use, boxes, keys, and what was trained.
-import { $, box, button, make } from "./wire.js";
+import { $, box, button, list, make, say } from "./wire.js";
 
 // The sensors are those of all pages in this tab; a reload and a restart of the server keep them.
 const KEY = "thenar.sensors";
@@ -56,7 +56,7 @@ export function showKeys(keys, press, letters = {}) {
 
 /** Show what was trained. */
 export function trained({ folder, facts }) {
-  const items = facts.map((fact) => make("li", {}, fact)), id = "build-heading";
   $("build").hidden = false;
-  $("build").replaceChildren(make("h3", { id }, `Trained: ${folder}`), make("ul", { id: "facts", "aria-labelledby": id }, ...items));
+  say($("build-heading"), `Trained: ${folder}`);
+  list($("facts"), facts);
 }

@@ -118,7 +118,9 @@ function matrix(trials) {
     label.title = name;
     return label;
   });
-  const numbers = (some, label, kind) => button(some.length, () => select(some), { class: "plain", "aria-label": label, "data-is": kind });
+  const numbers = (some, label, kind) => {
+    return button(some.length, () => select(some), { class: "plain", "aria-label": label, "data-is": kind });
+  };
   fillTable("confusion", ["", ...heads], trials.flatMap((those, truth) => {
     if (!those.length) return [];
     const name = type(truth), wrong = those.filter(misread), title = numbers(wrong, `${name}: select its ${wrong.length} errors`, "");
@@ -185,7 +187,8 @@ function pairOf(trials) {
 function showTrials({ trials, typical }) {
   const first = !$("trials").children.length, cards = trials.map((one) => card(one, typical));
   const usual = pairOf(selected).map(type).filter((name) => first && typical[name]).map((name) => {
-    return make("figure", { class: "boxed" }, make("figcaption", {}, tag(styles, name), ", typically"), ...hand(typical[name], [], `${name}, typically`));
+    const caption = make("figcaption", {}, tag(styles, name), ", typically");
+    return make("figure", { class: "boxed" }, caption, ...hand(typical[name], [], `${name}, typically`));
   });
   $("trials").append(...(cards.length === 1 ? [...cards, ...usual] : [...usual, ...cards]));
 }
@@ -215,7 +218,7 @@ function hand(shown, decisive, words) {
   const svg = draw("svg", { role: "img", "aria-label": `hand: ${words}` });
   // Drawn when it is nearly on the screen: before, it has no width, and thousands would take long.
   watcher.observe(svg);
-  waiting.set(svg, () => {
+  svg.paint = () => {
     const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
     const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
     const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
@@ -226,16 +229,15 @@ function hand(shown, decisive, words) {
       spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
     }
     svg.setAttribute("aria-label", `hand: ${words}`);
-  });
+  };
   return [svg];
 }
 
-const waiting = new WeakMap();
 const watcher = new IntersectionObserver((entries) => {
   for (const { target, isIntersecting } of entries) {
     if (!isIntersecting) continue;
     watcher.unobserve(target);
-    waiting.get(target)();
+    target.paint();
   }
 }, { rootMargin: "300px" });
 

@@ -2,8 +2,7 @@
 import { draw, drawHand } from "./hand.js";
 import { showKeys } from "./choice.js";
 import { openPage } from "./shell.js";
-import { clock } from "./state.js";
-import { $, button, fillTable, list, make, say } from "./wire.js";
+import { $, button, clock, fillTable, list, make, say } from "./wire.js";
 
 const PAST_S = 30, ASK_MS = 500, OLD_MS = 1000;
 const KINDS = { joint: "joints", pad: "pads" };

@@ -217,6 +217,33 @@ def test_what_a_run_lacks_is_said_in_a_sentence(browser: Browser, studio: Start,
     assert browser.text("steer-run") == "Stop"
 
 
+def test_without_builds_and_a_run_nothing_empty_is_shown(browser: Browser, studio: Start) -> None:
+    """Menus without members and parts without data are not there, and a sentence says what to do."""
+    server = studio().server
+    browser.open(f"{server.url}live.html")
+    browser.wait(lambda: browser.text("lacking").startswith("The project has no build yet: train one on "))
+    for name in (
+        "health",
+        "timeline",
+        "hand",
+        "types",
+        "devices-table",
+        "steer-build",
+        "steer-recording",
+        "steer-first",
+    ):
+        assert not browser.driver.find_element(By.ID, name).is_displayed(), name
+    letters = "return parseFloat(getComputedStyle(document.getElementById('grasp')).fontSize)"
+    assert browser.text("grasp") == "no frame yet"
+    assert browser.script(letters) < 40
+    assert browser.axe() == []
+    browser.open(f"{server.url}compare.html")
+    browser.wait(lambda: browser.driver.find_element(By.ID, "no-build").is_displayed())
+    for name in ("a", "b", "build"):
+        assert not browser.driver.find_element(By.ID, name).is_displayed(), name
+    assert browser.axe() == []
+
+
 def test_a_page_names_members_by_id_alone_and_its_requests_are_bounded(studio: Start, project: Path) -> None:
     opened = studio()
     place = urlsplit(opened.server.url).netloc

@@ -161,13 +161,12 @@ function spacing(places) {
 
 const VIEW = (38 * Math.PI) / 180;
 const DIGITS = {
-  little: { base: [-31, 78, 0], lean: -13, lengths: [36, 21, 18], width: 13 },
-  ring: { base: [-13, 87, 0], lean: -6, lengths: [44, 28, 20], width: 14.5 },
+  little: { base: [-31, 78, 0], lean: -13, beside: ["ring", -1], lengths: [36, 21, 18], width: 13 },
+  ring: { base: [-13, 87, 0], lean: -6, beside: ["middle", -1], lengths: [44, 28, 20], width: 14.5 },
   middle: { base: [6, 91, 0], lean: 0, lengths: [48, 31, 21], width: 15 },
-  index: { base: [25, 87, 0], lean: 6, lengths: [43, 26, 20], width: 15 },
+  index: { base: [25, 87, 0], lean: 6, beside: ["middle", 1], lengths: [43, 26, 20], width: 15 },
   thumb: { base: [22, 20, 4], lean: 42, lengths: [44, 33, 26], width: 17 },
 };
-const NEIGHBOUR = { index: ["middle", 1], ring: ["middle", -1], little: ["ring", -1] };
 const PALM = [[-21, -4, 0], [-34, 40, 0], "little", "ring", "middle", "index", [30, 45, 2], [21, -4, 0]];
 const SPAN = { abduction: 30, arch: 30, yaw: 40 }; // degrees for joints not measured as angles; for others 90
 
@@ -198,11 +197,10 @@ function posed(angles) {
   const arch = Math.sin(radians(at("palm", "arch"))), leans = { middle: at("middle", "abduction") }, chains = {};
   const bases = { ring: [0, 0, 18 * arch], little: [4 * Math.abs(arch), 0, 34 * arch] };
   for (const digit of ["middle", "index", "ring", "little"]) {
-    const { base, lean, lengths } = DIGITS[digit];
-    if (NEIGHBOUR[digit]) {
-      const [neighbour, side] = NEIGHBOUR[digit], spread = at(digit, "abduction", null);
-      const usual = lean - DIGITS[neighbour].lean;
-      leans[digit] = leans[neighbour] + (spread === null ? usual : side * spread);
+    const { base, lean, lengths, beside } = DIGITS[digit];
+    if (beside) {
+      const [neighbour, side] = beside, spread = at(digit, "abduction", side * (lean - DIGITS[neighbour].lean));
+      leans[digit] = leans[neighbour] + side * spread;
     }
     const angle = radians(leans[digit]), ahead = [Math.sin(angle), Math.cos(angle), 0], curl = at(digit, "curl");
     const pip = at(digit, "pip", curl), bends = [at(digit, "mcp", curl * 0.8), pip, at(digit, "dip", pip * 0.66)];

@@ -1,7 +1,6 @@
 // The frame of every page: the bar on top, the links to the other pages, the connection to the server, its work, and
 // what it refuses.
-import { clock } from "./state.js";
-import { $, button, connect, make, say, tell } from "./wire.js";
+import { $, button, clock, connect, make, say, tell } from "./wire.js";
 
 /** What the server does, in words. */
 export const WORK = {
@@ -24,21 +23,21 @@ export function openPage(handlers) {
   const busy = make("p", { class: "row" }, make("span", { id: "work", role: "status" }), cancel);
   const refused = make("p", { id: "refused", role: "alert" });
   document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages, busy, refused));
-  link(false, "connecting");
+  badge("link", "bad", "page: connecting");
   const send = connect({
     work,
     shell: show,
-    open: () => link(true, `connected since ${clock(performance.now())}`),
+    open: () => badge("link", "good", `page: connected since ${clock(performance.now())}`),
     closed: () => {
-      link(false, `not connected since ${clock(performance.now())}`);
+      badge("link", "bad", `page: not connected since ${clock(performance.now())}`);
       clearTimeout(lasts);
-      glove("warn", $("glove-state").hidden ? "" : "not known");
+      if (!$("glove-state").hidden) badge("glove-state", "warn", "glove: not known");
     },
     glove: ({ is, words, lasts_s: until }) => {
       const since = clock(performance.now());
       clearTimeout(lasts);
-      if (until) lasts = setTimeout(() => glove("bad", `silent since ${since}`), 1000 * until);
-      glove(is, words);
+      if (until) lasts = setTimeout(() => badge("glove-state", "bad", `glove: silent since ${since}`), 1000 * until);
+      badge("glove-state", is, words && `glove: ${words}`);
     },
     refused: ({ why }) => say(refused, why),
   }, handlers);
@@ -49,14 +48,9 @@ export function openPage(handlers) {
   };
 }
 
-function link(up, words) {
-  $("link").dataset.is = up ? "good" : "bad";
-  tell("link", `page: ${words}`);
-}
-
-function glove(level, words) {
-  $("glove-state").dataset.is = level;
-  tell("glove-state", words && `glove: ${words}`);
+function badge(id, level, words) {
+  $(id).dataset.is = level;
+  tell(id, words);
 }
 
 function show({ project, pages, wearer, build, rate }) {

@@ -268,16 +268,17 @@ export class Timeline {
 
   #bar(pen, kind, name, left, top, wide) {
     const { code = name, colour, ink } = kind === "trouble" ? {} : this.#styles.get(name) ?? {}, sign = kind === "wrong" ? "✗ " : "";
-    const fill = { wrong: this.#colours.bad, early: this.#colours.soft, trouble: name === "degraded" ? this.#colours.warn : this.#colours.bad }[kind] ?? colour;
+    const { page, text: letters, soft, line, warn, bad } = this.#colours;
+    const fill = { wrong: bad, early: soft, trouble: name === "degraded" ? warn : bad }[kind] ?? colour;
     const high = kind === "early" ? BAR / 3 : BAR;
-    pen.fillStyle = fill ?? this.#colours.page;
+    pen.fillStyle = fill ?? page;
     pen.fillRect(left, top + BAR - high, wide, high);
     if (!fill) {
-      pen.strokeStyle = this.#colours.line;
+      pen.strokeStyle = line;
       pen.strokeRect(left + 0.5, top + 0.5, Math.max(wide - 1, 0), BAR - 1);
     }
     const text = [name, code].map((one) => sign + one).find((one) => pen.measureText(one).width + 6 <= wide);
-    pen.fillStyle = kind !== "type" ? this.#colours.page : ink ?? this.#colours.text;
+    pen.fillStyle = kind !== "type" ? page : ink ?? letters;
     if (text && kind !== "early") pen.fillText(text, left + 3, top + BAR / 2 + 1);
   }
 
@@ -353,7 +354,8 @@ export class Timeline {
   }
 
   #jump(by) {
-    const places = this.tracks.flatMap(({ errors: { wrong } }) => wrong).map(({ from }) => from).sort((one, other) => one - other), at = this.at ?? this.last;
+    const places = this.tracks.flatMap(({ errors: { wrong } }) => wrong.map(({ from }) => from)).sort((one, other) => one - other);
+    const at = this.at ?? this.last;
     const next = by > 0 ? places.find((from) => from > at) : places.findLast((from) => from < at);
     if (next !== undefined) this.seek(next);
   }

@@ -1,13 +1,13 @@
 // The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
-import { State } from "./state.js";
 import { chip, typeStyles } from "./types.js";
-import { $, fillTable, list, make, say, tell } from "./wire.js";
+import { $, clock, fillTable, list, make, say, tell } from "./wire.js";
 
 const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
 const SETTLED_MS = 1000; // a text must be stable this long before it is read out
 const QUIET_MS = 3000; // minimum time between two texts
 const SHOWN = 8;
+const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
 
 // Of each health: its colour and sign, and what it means.
 const HEALTHS = {
@@ -182,5 +182,58 @@ export class View {
       Object.assign(said, { text: grasp, at: now });
       say($("spoken"), grasp);
     }
+  }
+}
+
+/**
+ * Watches the age of the data, and says it in #age.
+ *
+ * Data is old after half a second, or after three periods of its source if these are longer. Old data, and all data while
+ * the link is down, is greyed: the root element has the class "old".
+ */
+class State {
+  #readAt = null;
+  #dataUs = null;
+  #intervals = [];
+  #link = null;
+
+  /** @param {function(boolean): void} changed called with whether the data is old, when that changes */
+  constructor(changed = () => {}) {
+    this.changed = changed;
+    this.live = true; // moments of a recording have no age
+    this.old = false;
+    setInterval(() => this.#look(), LOOK_MS);
+  }
+
+  /**
+   * Take the moment at which the newest data was read, on any clock, and its age now, both in microseconds; null: none
+   * was read yet.
+   */
+  data(timeUs, ageUs) {
+    if (timeUs === null) return;
+    this.#readAt = performance.now() - ageUs / 1000;
+    if (this.#dataUs !== null && timeUs > this.#dataUs) this.#intervals.push((timeUs - this.#dataUs) / 1000);
+    if (this.#intervals.length > INTERVALS) this.#intervals.shift();
+    this.#dataUs = timeUs;
+    this.#look();
+  }
+
+  /** Take the state of the connection to the server. */
+  link(up) {
+    this.#link = up;
+    this.#look();
+  }
+
+  #look() {
+    const up = Boolean(this.#link), age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
+    const middle = [...this.#intervals].sort((one, other) => one - other)[this.#intervals.length >> 1] ?? 0;
+    const silent = this.live && age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
+    const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
+    const words = this.#link === null ? "" : !up ? `no data${since || " yet"}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "";
+    say($("age"), words);
+    document.documentElement.classList.toggle("old", old);
+    if (old === this.old) return;
+    this.old = old;
+    this.changed(old);
   }
 }

@@ -42,6 +42,9 @@ export function connect(...handlers) {
 
 export const $ = (id) => document.getElementById(id);
 
+/** Return the time of day of a moment of performance.now(): "10:24:07". */
+export const clock = (at) => new Date(Date.now() - performance.now() + at).toTimeString().slice(0, 8);
+
 /** Return a new element with these properties or attributes, and texts and elements in it. */
 export function make(kind, settings = {}, ...children) {
   const element = document.createElement(kind);
