@@ -290,7 +290,7 @@ class RecordPage:
         self._keys.put(asked.name)
 
     def _trial(self, asked: Asked) -> bytes:
-        """Return what was captured in a trial, as the hand shows it."""
+        """Return the captured frames of a trial, as the hand shows it."""
         if asked.trial not in self._captured:
             raise ThenarError(f"trial {asked.trial} was not recorded")
         sensors = GloveSensors(self._project.wiring(), self._project.hand())

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 Start = Callable[..., Studio]
 SWITCHES = ("thumb", "index", "palm")
 # What the switches and the flex sensor show in each grasp.
-HELD = {
+HELD: dict[str, dict[str, float]] = {
     "fist": {"thumb": 1, "index": 1, "palm": 1, "flex": 700},
     "pinch": {"thumb": 1, "index": 1, "palm": 0, "flex": 400},
     "point": {"thumb": 0, "index": 0, "palm": 1, "flex": 250},
