@@ -94,7 +94,13 @@ def readme_of(spec: GloveSpec) -> str:
     parts = [f"{summary.glove}: a glove with {summary.kept}", *_building(summary)]
     parts += ["What to expect", *expectations(spec)]
     doubts = [f"{m.part or m.what}: {m.note}" for m in summary.materials if not m.sure]
-    parts += ["Please note", *_advice(summary), *summary.remarks, *doubts]
+    parts += [
+        "Please note",
+        "Supply all chips and pull-ups with the voltage of the host's bus: 3.3 V on a Raspberry Pi.",
+    ]
+    if any(sensor.kind == "switch" for sensor in summary.sensors):
+        parts.append("A contact bounces for up to 3 ms when it closes and 8 ms when it opens: thenar debounces.")
+    parts += [*summary.remarks, *doubts]
     headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "Please note"}
     laid_out = (f"{part}\n{'-' * len(part)}\n" if part in headings else fill(part, _WIDTH) + "\n" for part in parts)
     return "\n".join(laid_out)
@@ -152,12 +158,6 @@ def _cutting(summary: SpecSummary) -> Iterator[str]:
         "creases of the joints."
     )
     yield "sensors.csv: every wired sensor with its position, measured from the middle of the wrist, and its pin."
-
-
-def _advice(summary: SpecSummary) -> Iterator[str]:
-    yield "Supply all chips and pull-ups with the voltage of the host's bus: 3.3 V on a Raspberry Pi."
-    if any(sensor.kind == "switch" for sensor in summary.sensors):
-        yield "A contact bounces for up to 3 ms when it closes and 8 ms when it opens: thenar debounces."
 
 
 def netlist_of(circuit: Circuit, title: str) -> bytes:

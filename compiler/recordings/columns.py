@@ -242,7 +242,12 @@ def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
         *(("taxels", entry, entry.columns) for entry in columns.taxels),
         *(("joints", entry, entry.columns) for entry in columns.joints),
     ]
-    _check_globs([glob for _, _, globs in lists for glob in globs], names)
+    every = [glob for _, _, globs in lists for glob in globs]
+    longest = max(every, key=len, default="")
+    if len(longest) > LONGEST_GLOB:
+        raise TableError(f"the glob {shortened(repr(longest))} has more than {LONGEST_GLOB} characters: shorten it")
+    if sum(map(_is_wild, every)) * len(names) > COMPARISONS:  # which would take too long
+        raise TableError(f"{len(every)} globs are too many for {len(names)} columns: name columns, or use fewer globs")
     matched = (
         (name, entry)
         for what, entry, globs in lists
@@ -265,15 +270,6 @@ def select(columns: ColumnRoles, names: Sequence[str]) -> Selection:
         ),
         coded=(*joints, *((name, entry) for name, entry in taxels if entry.threshold == "learnt")),
     )
-
-
-def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
-    """Raise TableError if there are too many globs, or too long ones, to match in reasonable time."""
-    longest = max(globs, key=len, default="")
-    if len(longest) > LONGEST_GLOB:
-        raise TableError(f"the glob {shortened(repr(longest))} has more than {LONGEST_GLOB} characters: shorten it")
-    if sum(map(_is_wild, globs)) * len(names) > COMPARISONS:
-        raise TableError(f"{len(globs)} globs are too many for {len(names)} columns: name columns, or use fewer globs")
 
 
 def _matches(what: str, pattern: str, names: Sequence[str], there: set[str]) -> list[str]:

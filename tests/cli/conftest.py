@@ -89,3 +89,35 @@ def small_build(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -
 @pytest.fixture
 def build_folder(small_build: Path, tmp_path: Path) -> Path:
     return copytree(small_build, tmp_path / "build")
+
+
+@pytest.fixture
+def importing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in a folder of its own, and without a terminal."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, "isatty", lambda descriptor: False)
+
+
+def columns_toml() -> Path:
+    """Return the file of the detected columns."""
+    (path,) = Path().glob("*columns.toml")
+    return path
+
+
+def imported(*arguments: str, output: str = "set.grasps") -> GraspSet:
+    """Import with the detected columns, and again with those that were written: the sets are the same."""
+    words = ["import", *arguments, "-o", output, "--overwrite"]
+    assert run([*words, "--yes"]) == 0
+    found = Path(output).read_bytes()
+    assert run([*words, "--columns", str(Path(output).with_suffix(".columns.toml"))]) == 0
+    assert Path(output).read_bytes() == found
+    return GraspSet.load(output)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """Return the sentence by which an import is refused."""
+    capsys.readouterr()
+    assert run(["import", *arguments, "-o", "set.grasps", "--overwrite"]) == 2
+    said = capsys.readouterr().err
+    assert (said[:8], said.count("\n"), "Traceback" in said) == ("thenar: ", 1, False)
+    return said

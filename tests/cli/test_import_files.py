@@ -14,6 +14,10 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet
 
+from .conftest import columns_toml, imported, refused
+
+pytestmark = pytest.mark.usefixtures("importing")
+
 PATTERN = "data/{label}/{subject}_{trial}.csv"
 Trial = tuple[str, str, int, pd.DataFrame]
 
@@ -45,39 +49,13 @@ def write(pattern: str = PATTERN, start: float = 0.0, **constant: str) -> list[P
     return paths
 
 
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(os, "isatty", lambda descriptor: False)
-    return tmp_path
-
-
-def columns_toml() -> Path:
-    """Return the file of the detected columns."""
-    (path,) = Path().glob("*columns.toml")
-    return path
-
-
-def imported(*arguments: str) -> GraspSet:
-    assert run(["import", *arguments, "-o", "set.grasps", "--overwrite"]) == 0
-    return GraspSet.load("set.grasps")
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    capsys.readouterr()
-    assert run(["import", *arguments, "-o", "set.grasps", "--overwrite"]) == 2
-    return capsys.readouterr().err
-
-
 def test_the_fields_of_a_pattern_are_columns() -> None:
     write()
-    found = imported(PATTERN, "--yes")
-    # What was proposed is what the same pattern can be imported with.
-    assert imported(PATTERN, "--columns", str(columns_toml())).fingerprint() == found.fingerprint()
+    found = imported(PATTERN)
     tables = [frame.assign(label=label, subject=subject, trial=trial) for label, subject, trial, frame in trials()]
     order = sorted(range(18), key=lambda n: ("cup key pen".index(tables[n]["label"][0]), n))
     pd.concat([tables[number] for number in order]).to_csv("one.csv", index=False)
-    one = imported("one.csv", "--yes")
+    one = imported("one.csv")
     for name in ("codes", "labels", "subjects", "trials", "times_us"):
         assert np.array_equal(getattr(found, name), getattr(one, name)), name
     assert found.taxonomy == one.taxonomy
@@ -104,7 +82,7 @@ def test_a_folder_proposes_its_pattern(capsys: pytest.CaptureFixture[str]) -> No
     assert again == f"thenar import '{PATTERN}' -o set.grasps --columns {columns_toml()}\n"
     assert run(shlex.split(again)[1:]) == 0
     by_hand = GraspSet.load("set.grasps")
-    assert imported("data", "--yes").fingerprint() == by_hand.fingerprint()
+    assert imported("data").fingerprint() == by_hand.fingerprint()
     assert len(np.unique(by_hand.trial_ids)) == 18
 
 
@@ -125,7 +103,7 @@ def test_names_of_many_sets_are_understood(written: str, proposed: str, capsys: 
         path.parent.mkdir(exist_ok=True)
         if "subject} {label" in written or "subject_{subject}" in written:
             path.rename(str(path).replace("cup", "power"))
-    found = imported("data", "--yes")
+    found = imported("data")
     assert f"18 files as {proposed}" in capsys.readouterr().out.splitlines()
     assert len(np.unique(found.trial_ids)) == 18
     assert len(found.taxonomy.types) == 3
@@ -136,7 +114,7 @@ def test_names_of_many_sets_are_understood(written: str, proposed: str, capsys: 
 def test_each_file_is_a_trial_whatever_its_path_says(pattern: str) -> None:
     """Also where time goes on from file to file."""
     write("data/{label}_{subject}_{trial}.csv", start=1.0)
-    found = imported(pattern, "--yes")
+    found = imported(pattern)
     assert len(np.unique(found.trial_ids)) == 18
     assert 'trial = "file"' in columns_toml().read_text()
 
@@ -146,18 +124,18 @@ def test_numbers_of_trials_in_the_files_are_of_one_file() -> None:
         for day in (1, 2):
             table = pd.concat([frame.assign(grasp=label, rep=trial) for label, _, trial, frame in trials()])
             table.to_csv(f"{subject}_{day}.csv", index=False)
-    found = imported("{subject}_{part}.csv", "--yes")
+    found = imported("{subject}_{part}.csv")
     assert len(np.unique(found.trial_ids)) == 2 * 2 * 9
     assert found.joint_names == ("f1", "f2")
     assert 'trial = [\n    "file",\n    "rep",\n]' in columns_toml().read_text()
-    assert len(np.unique(imported("{subject}_{session}.csv", "--yes").sessions)) == 2
+    assert len(np.unique(imported("{subject}_{session}.csv").sessions)) == 2
 
 
 def test_spreadsheets_are_read_as_well(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     for path in write("{label}/{subject}_{trial}.xlsx"):
         if "2" in path.stem or "10" in path.stem:
             path.unlink()
-    assert len(np.unique(imported("{label}/{subject}_{trial}.xlsx", "--yes").trial_ids)) == 6
+    assert len(np.unique(imported("{label}/{subject}_{trial}.xlsx").trial_ids)) == 6
     # Some are read by one process; what ends it is one of them, and is named.
     crash = Path("crash")
     crash.write_text(f'#!/bin/sh\ncase "$*" in *pen/ben_1*) kill -SEGV $$;; esac\nexec "{sys.executable}" "$@"\n')
@@ -188,7 +166,7 @@ def test_faults_name_the_file_and_the_row(capsys: pytest.CaptureFixture[str]) ->
         assert said in refused(capsys, PATTERN, "--yes")
     lines = good.splitlines()
     path.write_text(good)
-    imported(PATTERN, "--yes")
+    imported(PATTERN)
     path.write_text("\n".join([*lines[:3], "0.02,oops,1", *lines[4:]]))
     assert "1 cell, row 4 of key/ben_2.csv 'f1' ('oops')" in refused(capsys, PATTERN, "--columns", str(columns_toml()))
     path.write_text("\n".join([*lines[:3], "0.02,,1", *lines[4:]]))
@@ -214,7 +192,7 @@ def test_what_is_no_set_of_files_is_said(capsys: pytest.CaptureFixture[str]) -> 
     Path("data/cup/anna_3.csv").unlink()
     os.mkfifo("data/cup/anna_3.csv")
     Path("data/cup/anna_4.csv").symlink_to("nowhere")
-    assert len(np.unique(imported(PATTERN, "--yes").trial_ids)) == len(paths)
+    assert len(np.unique(imported(PATTERN).trial_ids)) == len(paths)
     Path("empty").mkdir()
     assert "empty holds no tables (.csv, .tsv" in refused(capsys, "empty", "--yes")
     # A file whose name has braces is a file.
@@ -227,7 +205,7 @@ def test_what_is_no_set_of_files_is_said(capsys: pytest.CaptureFixture[str]) -> 
 def test_fields_cannot_leave_the_folder(capsys: pytest.CaptureFixture[str]) -> None:
     write()
     Path("other_1.csv").write_text("time,f1,f2\n0,1,2\n")
-    assert len(np.unique(imported("data/*/{label}_{trial}.csv", "--yes").trial_ids)) == 18
+    assert len(np.unique(imported("data/*/{label}_{trial}.csv").trial_ids)) == 18
     assert "no table matches" in refused(capsys, "data/{label}{x}_{trial}.csv", "--yes")
 
 
@@ -238,7 +216,7 @@ def test_a_stream_in_each_file_keeps_its_trials() -> None:
     for subject in ("anna", "ben"):
         rows = [f"{n / 100},{label},{poses[label] + n % 7}.5\n" for n, label in enumerate(labels)]
         Path(f"{subject}.csv").write_text("t,label,bend\n" + "".join(rows))
-    found = imported("{subject}.csv", "--yes")
+    found = imported("{subject}.csv")
     assert len(np.unique(found.movement_ids)) == 10
     assert {*found.subjects.tolist()} == {"anna", "ben"}
     assert 'frames = "restart"' in columns_toml().read_text()

@@ -1,6 +1,5 @@
 """Several tables of the same trials: further columns, facts about trials, segments of a recording."""
 
-import os
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,36 +10,14 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet
 
+from .conftest import imported, refused
+
+pytestmark = pytest.mark.usefixtures("importing")
+
 POSES = {"power": 60, "hook": 30, "tip": 10}
 # Of each recording: the rows in which a segment begins and ends, and its label.
 SEGMENTS = [(10, 40, "power"), (50, 70, "hook"), (70, 95, "hook"), (100, 130, "tip")]
 ROWS = 140
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(os, "isatty", lambda descriptor: False)
-    return tmp_path
-
-
-def imported(*arguments: str, output: str = "set.grasps") -> GraspSet:
-    """Import with the detected columns, and again with those that were written."""
-    assert run(["import", *arguments, "-o", output, "--overwrite", "--yes"]) == 0
-    found = GraspSet.load(output)
-    columns = str(Path(output).with_suffix(".columns.toml"))
-    assert run(["import", *arguments, "-o", output, "--overwrite", "--columns", columns]) == 0
-    assert GraspSet.load(output).fingerprint() == found.fingerprint()
-    return found
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    capsys.readouterr()
-    assert run(["import", *arguments, "-o", "set.grasps", "--overwrite", "--yes"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("thenar: ")
-    assert "Traceback" not in said
-    return said
 
 
 def trials() -> list[tuple[str, str, int]]:
@@ -103,9 +80,9 @@ def test_tables_without_a_time_stand_row_by_row(capsys: pytest.CaptureFixture[st
     shuffled.set_axis(["s4", "s5", "trial"], axis="columns").to_excel("c.xlsx", index=False)
     assert imported("a.csv", "b.csv", "c.xlsx").switches.tolist() == values[:, [0, 1, 2, 1, 2]].astype(bool).tolist()
     shuffled.iloc[1:].to_csv("b.csv", index=False)
-    assert "a.csv and b.csv have 5 and 4 rows of the trial with row " in refused(capsys, "a.csv", "b.csv")
+    assert "a.csv and b.csv have 5 and 4 rows of the trial with row " in refused(capsys, "a.csv", "b.csv", "--yes")
     more[more["trial"] != 3].to_csv("b.csv", index=False)
-    assert "b.csv has no rows of the trial with row 17\n" in refused(capsys, "a.csv", "b.csv")
+    assert "b.csv has no rows of the trial with row 17\n" in refused(capsys, "a.csv", "b.csv", "--yes")
 
 
 def test_a_table_with_a_row_for_each_file_names_it(capsys: pytest.CaptureFixture[str]) -> None:
@@ -118,10 +95,10 @@ def test_a_table_with_a_row_for_each_file_names_it(capsys: pytest.CaptureFixture
         found = imported("d/S1_{subject}_*_{trial}.csv", "facts.csv")
         assert found.grasps.tolist() == by_path.grasps.tolist()
     table.iloc[:-1].to_csv("facts.csv", index=False)
-    said = refused(capsys, "d/S1_{subject}_*_{trial}.csv", "facts.csv")
+    said = refused(capsys, "d/S1_{subject}_*_{trial}.csv", "facts.csv", "--yes")
     assert "facts.csv has no rows of the trial with row 2 of S1_ben_tip_10.csv" in said
     table.assign(filename="else").to_csv("facts.csv", index=False)
-    said = refused(capsys, "d/S1_{subject}_*_{trial}.csv", "facts.csv")
+    said = refused(capsys, "d/S1_{subject}_*_{trial}.csv", "facts.csv", "--yes")
     assert "facts.csv has no rows of any trial of d/S1_{subject}_*_{trial}.csv, but of filename else" in said
 
 
@@ -146,7 +123,7 @@ def test_an_empty_key_is_not_the_trial_0(capsys: pytest.CaptureFixture[str]) -> 
     frame = pd.DataFrame({"label": ["tip", "cup"] * 12, "trial": np.arange(24), "flex": np.arange(24) / 8})
     frame.astype({"trial": str}).replace({"trial": {"7": "00", "0": ""}}).to_csv("t.csv", index=False)
     pd.DataFrame({"trial": np.arange(24), "object": ["ball", "pen"] * 12}).to_csv("facts.csv", index=False)
-    assert "facts.csv has no rows of the trial with row 2\n" in refused(capsys, "t.csv", "facts.csv")
+    assert "facts.csv has no rows of the trial with row 2\n" in refused(capsys, "t.csv", "facts.csv", "--yes")
 
 
 def recordings() -> dict[str, pd.DataFrame]:
@@ -227,10 +204,10 @@ def test_bags_follow_a_table_of_segments(capsys: pytest.CaptureFixture[str]) -> 
     assert "segments.csv: segments, in seconds from its first row" in capsys.readouterr().out
     assert np.array_equal(found.is_none, np.tile([*[True] * 10, *[False] * 20, *[True] * 10], 9))
     assert found.grasps[~found.is_none].tolist() == np.repeat([*POSES] * 3, 20).tolist()
-    assert "bags is a folder: name the pattern of its tables" in refused(capsys, "bags", "segments.csv")
+    assert "bags is a folder: name the pattern of its tables" in refused(capsys, "bags", "segments.csv", "--yes")
     # A bag alone is a table, and a file next to bags is none of them, nor is a folder with other metadata.
     Path("bags/metadata.yaml").write_text("authors: us\n")
-    assert "no column looks like the grasp type" in refused(capsys, "bags/trial_01")
+    assert "no column looks like the grasp type" in refused(capsys, "bags/trial_01", "--yes")
     Path("segments.csv").rename("bags/segments.csv")
     assert imported("bags/trial_{trial}", "bags/segments.csv").fingerprint() == found.fingerprint()
 
@@ -251,7 +228,7 @@ def test_bags_follow_a_table_of_segments(capsys: pytest.CaptureFixture[str]) -> 
 def test_broken_segments_are_told_in_a_sentence(rows: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
     recordings()["anna"].to_csv("anna.csv", index=False)
     Path("segments.csv").write_text(f"start,end,label\n{rows}\n")
-    assert said in refused(capsys, "anna.csv", "segments.csv")
+    assert said in refused(capsys, "anna.csv", "segments.csv", "--yes")
 
 
 def test_tables_that_do_not_belong_together_are_told(capsys: pytest.CaptureFixture[str]) -> None:
@@ -273,4 +250,4 @@ def test_tables_that_do_not_belong_together_are_told(capsys: pytest.CaptureFixtu
         ("twice", "other", "time starts again within a trial: name trials in both"),
         ("anna", "no", "no.csv: 'time' is no time in row 2, by which tables are joined"),
     ):
-        assert said in refused(capsys, f"{first}.csv", f"{second}.csv")
+        assert said in refused(capsys, f"{first}.csv", f"{second}.csv", "--yes")

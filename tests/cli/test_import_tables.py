@@ -8,39 +8,13 @@ import pandas as pd
 import pytest
 
 from thenar.cli import run
-from thenar.compiler import GraspSet, from_dataframe
+from thenar.compiler import from_dataframe
+
+from .conftest import columns_toml, imported, refused
+
+pytestmark = pytest.mark.usefixtures("importing")
 
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def columns_toml() -> Path:
-    """Return the file of the detected columns."""
-    (path,) = Path().glob("*columns.toml")
-    return path
-
-
-def imported(path: str | Path, capsys: pytest.CaptureFixture[str]) -> GraspSet:
-    """Import `path` with the detected columns, and again with the columns.toml of that: the sets are the same."""
-    for made in Path().glob("*columns*.toml"):
-        made.unlink()
-    assert run(["import", str(path), "-o", "a.grasps", "--yes", "--overwrite"]) == 0, capsys.readouterr().err
-    assert run(["import", str(path), "-o", "b.grasps", "--columns", str(columns_toml()), "--overwrite"]) == 0
-    assert Path("a.grasps").read_bytes() == Path("b.grasps").read_bytes()
-    return GraspSet.load("a.grasps")
-
-
-def refused(path: str | Path, capsys: pytest.CaptureFixture[str]) -> str:
-    capsys.readouterr()
-    assert run(["import", str(path), "-o", "a.grasps", "--yes", "--overwrite"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    return said
 
 
 def rows(columns: int) -> list[list[str]]:
@@ -62,7 +36,7 @@ def write(path: str, lines: Sequence[Sequence[str]], delimiter: str = ",") -> No
 def test_a_header_may_be_of_any_length(columns: int, capsys: pytest.CaptureFixture[str]) -> None:
     names = [f"RightHand_{FINGERS[place % 5]}_Phalanx_{place}_Rotation" for place in range(columns)]
     write("manus.csv", [["grasp", "trial", *names], *rows(columns)])
-    assert imported("manus.csv", capsys).joint_names == tuple(names)
+    assert imported("manus.csv").joint_names == tuple(names)
     assert f"{columns:,} joints rounded to codes, at most 0.0" in capsys.readouterr().out
 
 
@@ -89,11 +63,11 @@ def test_lines_before_the_table_are_left_out(
     Path("t.txt").write_text(PREFACES[kind].replace(",", delimiter) + text)
     said = ""
     if header:
-        grasp_set = imported("t.txt", capsys)
+        grasp_set = imported("t.txt")
         assert grasp_set.joint_names == FINGERS[:4]
         said = capsys.readouterr().out
     else:
-        assert "no column tells which rows are frames of one trial" in refused("t.txt", capsys)
+        assert "no column tells which rows are frames of one trial" in refused(capsys, "t.txt", "--yes")
     lines = PREFACES[kind].count("\n")
     assert (f"skip = {lines}\n" in columns_toml().read_text()) is bool(lines)
     assert ("rows left out at the top" in said) is bool(lines and header)
@@ -105,7 +79,7 @@ def test_a_spreadsheet_has_lines_before_its_table_too(capsys: pytest.CaptureFixt
     with pd.ExcelWriter("t.xlsx", engine="openpyxl") as writer:
         pd.DataFrame([["Lab", "Bern"], ["Rate", 100]]).to_excel(writer, index=False, header=False)
         frame.to_excel(writer, index=False, startrow=3)
-    grasp_set = imported("t.xlsx", capsys)
+    grasp_set = imported("t.xlsx")
     assert grasp_set.joint_names == FINGERS[:3]
     assert "skip = 3\n" in columns_toml().read_text()
     columns_toml().write_text(columns_toml().read_text().replace("skip = 3", "skip = 99"))
@@ -117,7 +91,7 @@ def test_rows_keep_their_numbers_below_a_preface(capsys: pytest.CaptureFixture[s
     write("t.csv", [["grasp", "trial", "a"], *rows(1)])
     text = PREFACES["sto"] + Path("t.csv").read_text()
     Path("t.csv").write_text(text)
-    imported("t.csv", capsys)
+    imported("t.csv")
     lines = text.splitlines()
     lines[9] = "A,1,oops"
     Path("t.csv").write_text("\n".join(lines))
@@ -131,11 +105,11 @@ def test_runs_of_blanks_are_one_delimiter(capsys: pytest.CaptureFixture[str]) ->
     lines = ["".join(f"{float(cell):16.7e}" for cell in row) + "  " for row in body]
     for head in ("grasp  trial a b\tc", "# grasp trial a b c", "%grasp trial a  b c"):
         Path("t.txt").write_text("\n".join([head, *lines]) + "\n")
-        grasp_set = imported("t.txt", capsys)
+        grasp_set = imported("t.txt")
         assert grasp_set.joint_names == ("a", "b", "c")
         assert len(grasp_set) == 24
     np.savetxt("t.csv", np.array(body, float), delimiter=",", header="grasp,trial,a,b,c")
-    assert imported("t.csv", capsys).joint_names == ("a", "b", "c")
+    assert imported("t.csv").joint_names == ("a", "b", "c")
 
 
 LISTS = {
@@ -151,7 +125,7 @@ def wide_codes(capsys: pytest.CaptureFixture[str]) -> np.ndarray:
     wide = pd.DataFrame([[row[0], row[1], *map(float, row[2:])] for row in rows(3)])
     wide.columns = pd.Index(["grasp", "trial", "data.0", "data.1", "data.2"])
     wide.to_csv("u.csv", index=False)
-    return imported("u.csv", capsys).codes
+    return imported("u.csv").codes
 
 
 @pytest.mark.parametrize("kind", LISTS)
@@ -160,7 +134,7 @@ def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[
         [[row[0], row[1], LISTS[kind](row[2:])] for row in rows(3)], columns=["grasp", "trial", "data"]
     )
     table.to_csv("t.csv", index=False)
-    grasp_set = imported("t.csv", capsys)
+    grasp_set = imported("t.csv")
     assert grasp_set.joint_names == ("data.0", "data.1", "data.2")
     assert np.array_equal(grasp_set.codes, wide_codes(capsys))
 
@@ -174,7 +148,7 @@ def test_so_do_lists_of_spreadsheets_data_frames_and_parquet(capsys: pytest.Capt
     lists.astype({"data": str}).to_excel("t.xlsx", index=False)
     lists.to_parquet("t.parquet")
     for name in ("t.xlsx", "t.parquet"):
-        assert np.array_equal(imported(name, capsys).codes, codes)
+        assert np.array_equal(imported(name).codes, codes)
     for made in (lists, lists.assign(data=[np.array(row) for row in lists["data"]])):
         assert np.array_equal(from_dataframe(made).codes, codes)
 
@@ -200,7 +174,7 @@ ODDITIES = {
 @pytest.mark.parametrize("text", ODDITIES, ids=range(len(ODDITIES)))
 def test_the_error_names_the_first_oddity(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("t.csv").write_text(text)
-    assert ODDITIES[text] in refused("t.csv", capsys)
+    assert ODDITIES[text] in refused(capsys, "t.csv", "--yes")
 
 
 def test_a_column_with_a_broken_cell_is_left_out_by_its_row(capsys: pytest.CaptureFixture[str]) -> None:

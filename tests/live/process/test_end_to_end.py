@@ -28,8 +28,14 @@ PLAYED_US = 1_000_000
 
 @pytest.mark.parametrize(
     ("inputs", "parts"),
-    [("switches", ("bus",)), ("both", ("glove", "bus")), ("both", ("glove", "board", "bus"))],
-    ids=["bus", "glove and bus", "all"],
+    [
+        ("switches", ("bus",)),
+        ("joints", ("glove",)),
+        ("switches", ("board",)),
+        ("both", ("glove", "bus")),
+        ("both", ("glove", "board", "bus")),
+    ],
+    ids=["bus", "glove", "board", "glove and bus", "all"],
 )
 def test_live_and_replayed_answers_are_the_offline_classification(
     run: MakeRun, tmp_path: Path, inputs: str, parts: tuple[str, ...]

@@ -37,9 +37,9 @@ def test_a_signal_ends_a_run_cleanly_with_its_recording_closed(
     assert all(then == now for then, now in replayed(running.scene.truth.build, path, FRANK))
 
 
-def test_signals_end_a_run_whose_devices_are_all_gone(run: MakeRun) -> None:
-    running = run("both", "glove", "board", "bus")
-    client = running.start()
+def test_signals_end_a_run_whose_devices_are_all_gone(run: MakeRun, tmp_path: Path) -> None:
+    running, path = run("both", "glove", "board", "bus"), tmp_path / "run.mcap"
+    client = running.start("--record", path)
     running.scene.settled(0)
     for line in running.bench.lines:
         line.unplug()
@@ -48,6 +48,9 @@ def test_signals_end_a_run_whose_devices_are_all_gone(run: MakeRun) -> None:
     last = running.scene.grasps.wait(lambda grasp: grasp.health == "unknown", gone_us)
     assert last.grasp == "unknown"
     assert client.end(signal.SIGTERM) == 0
+    pairs = list(replayed(running.scene.truth.build, path, FRANK))
+    assert all(then == now for then, now in pairs)
+    assert {then.health for then, _ in pairs} >= {"ok", "unknown"}
 
 
 def test_a_killed_run_leaves_its_recording_and_free_devices(run: MakeRun, tmp_path: Path) -> None:

@@ -115,15 +115,6 @@ def test_silent_parts_are_lost_once_without_any_arrival(make_build: MakeBuild, m
         assert (gone.health, len(gone.lost), gone.candidate) == ("unknown", 6, "unknown")
 
 
-def test_a_part_silent_after_another_is_lost_at_once(make_build: MakeBuild, joined: Joined) -> None:
-    """The joined frame is then older than the one before it, but for the time of the part that is lost."""
-    live = switches_only(make_build, 10_000)
-    frames = [(49_000, 1, SwitchFrame(49_000, 0b011000), 20_000), (50_000, 0, SwitchFrame(50_000, 0b101), 2000)]
-    assert live.step(52_000, 0, joined(6, [0b000111, 0b111000], frames, 52_000), None).grasp.health == "ok"
-    later = joined(6, [0b000111, 0b111000], frames, 52_001)
-    assert live.step(52_001, 0, later, None).grasp.lost == ("s0", "s1", "s2")
-
-
 def test_a_silent_bus_does_not_take_a_living_glove_down_with_it(make_build: MakeBuild) -> None:
     build = make_build()
     arrivals = FrameBuffer(6, [0b111111])
