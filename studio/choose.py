@@ -96,8 +96,8 @@ class ChoosePage:
 
     @property
     def types(self) -> tuple[str, ...]:
-        """The grasp types that a trial may be of."""
-        return self._set.taxonomy.types
+        """The grasp types that a trial may be of. Raises ThenarError before the recordings are read."""
+        return self.known.held.taxonomy.types
 
     @property
     def known(self) -> QuickAccuracy:

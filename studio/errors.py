@@ -111,13 +111,12 @@ class ErrorsPage:
 
     def read(self, report: Report) -> None:
         """Let the build in use recognise the recordings, if it can, and show what was edited."""
-        self._build, built, name, why = None, self._project.build(), "", ""
-        if built is not None:
-            name = built[0].name
-            try:
-                self._build = BuildReading(name, built[1], self._choose.known)
-            except ThenarError as reason:
-                name, why = "", f"build {name} is left out: {reason}"
+        self._build, name, why = None, "", ""
+        try:
+            if (built := self._project.build()) is not None:
+                self._build, name = BuildReading(built[0].name, built[1], self._choose.known), built[0].name
+        except (ThenarError, OSError) as reason:
+            why = f"build {self._project.state.build} is left out: {reason}"
         self._studio.publish("recogniser", message("recogniser", build=name, why=why))
         self._tell_edits()
 

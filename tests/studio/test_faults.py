@@ -3,6 +3,9 @@
 import json
 import os
 import shutil
+import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,8 +35,8 @@ PATIENCE_S = 30
 
 
 @contextmanager
-def page(opened: Studio, topics: str) -> Iterator[ClientConnection]:
-    address = opened.server.url.removeprefix("http://").rstrip("/")
+def page(url: str, topics: str) -> Iterator[ClientConnection]:
+    address = url.removeprefix("http://").rstrip("/")
     with connect(f"ws://{address}/live?topics={topics}", origin=Origin(f"http://{address}"), proxy=None) as live:
         yield live
 
@@ -47,7 +50,7 @@ def until(live: ClientConnection, fits: Callable[[dict[str, Any]], bool]) -> dic
 
 def refusal(opened: Studio, **asked: object) -> str:
     """Return why a request is refused."""
-    with page(opened, "none") as live:
+    with page(opened.server.url, "none") as live:
         live.send(json.dumps(asked))
         return str(until(live, lambda told: told["topic"] == "refused")["why"])
 
@@ -60,13 +63,14 @@ def test_a_build_that_is_half_written_hides_nothing_else(
     Project(folder, hand).remember(build="more", wearer="A")
     (folder / "more" / "build.json").write_bytes((folder / "more" / "build.json").read_bytes()[:100])
     (folder / "half.grasps").write_bytes(b"half")
-    with page(studio(), "shell,set,recordings,wearing,work") as live:
+    with page(studio().server.url, "shell,set,recordings,wearing,recogniser,work") as live:
         shown = dict[str, Any]()
-        while not {"shell", "set", "recordings", "wearing"} <= {*shown} or "why" not in shown["work"]:
+        while not {"shell", "set", "recordings", "wearing", "recogniser"} <= {*shown} or "why" not in shown["work"]:
             told = json.loads(live.recv(timeout=PATIENCE_S))
             shown[told["topic"]] = told
     assert shown["shell"]["build"] == ""
     assert "build.json" in shown["wearing"]["why"]
+    assert "build.json" in shown["recogniser"]["why"]
     assert "build.json" in shown["work"]["why"]
     assert shown["set"]["name"] == "set.grasps"
     assert [said.partition(" is")[0] for said in shown["set"]["unused"]] == ["half.grasps"]
@@ -81,7 +85,7 @@ def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(
     people.rows(people.subjects == "C").save(folder / "C.grasps")
     (folder / "half.grasps").write_bytes(b"half")
     (folder / "few" / "build.json").write_bytes(b"{")
-    with page(studio(None), "wearing,adapted") as live:
+    with page(studio(None).server.url, "wearing,adapted") as live:
         shown = until(live, lambda told: bool(told["sets"]))
         assert [one["name"] for one in shown["sets"]] == ["C.grasps"]
         live.send(json.dumps({"do": "adapt", "ids": [one["id"] for one in shown["sets"]]}))
@@ -96,6 +100,12 @@ def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Pa
     assert "No such file" in why
     assert "studio.json" in why
     assert "load the page again" in refusal(opened, do="use", id="0123456789ab")
+
+
+def test_without_recordings_no_trial_is_edited(studio: Start, tmp_path: Path) -> None:
+    """Also if a page sends the numbering of none."""
+    assert "not read yet" in refusal(studio(None), do="edit", name="cup")
+    assert not (tmp_path / "recorded" / "edits.jsonl").exists()
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
@@ -161,7 +171,7 @@ def test_a_bug_frees_the_glove_and_ends_no_studio(studio: Start, caplog: pytest.
         raise ZeroDivisionError
 
     opened = studio()
-    with page(opened, "station,work") as live:
+    with page(opened.server.url, "station,work") as live:
         opened.station.start("watching", fail)
         assert until(live, lambda told: bool(told.get("why")))["why"] == "a bug in thenar: ZeroDivisionError"
         opened.queue("measure", fail)
@@ -182,16 +192,26 @@ def board() -> Iterator[tuple[LineServer, BoardSender]]:
         yield line, board
 
 
+def glove(line: LineServer) -> str:
+    stream = f'port = "{line.port}"\nrate_hz = 200\nswitches = ["s1"]\njoints = {{ j1 = [0, 254] }}\n'
+    return f'name = "bench"\n[[stream]]\n{stream}'
+
+
 def lead(live: ClientConnection, board: BoardSender, done: int, doing: str) -> None:
-    """Accept trials of a collection that begins, and leave it when so many are done."""
+    """Accept trials of a collection that begins, until so many are done."""
     told, step = until(live, lambda told: told["topic"] == "collecting" and told.get("doing") == doing), ""
-    while told["stage"] != "over":
+    while told.get("done", 0) < done:
         before, step = step, str([told.get(name) for name in ("stage", "number", "done")])
         board.show(CLOSED.get(told.get("prompt", ""), {}))
-        key = "quit" if told.get("done", 0) >= done else "accept"
-        if step != before and (key == "quit" or key in told.get("keys", {})):
-            live.send(json.dumps({"do": "key", "name": key}))
+        if step != before and "accept" in told.get("keys", {}):
+            live.send(json.dumps({"do": "key", "name": "accept"}))
         told = until(live, lambda told: told["topic"] == "collecting")
+
+
+def leave(live: ClientConnection) -> None:
+    """Leave a collection, and wait until its set is written."""
+    live.send(json.dumps({"do": "key", "name": "quit"}))
+    until(live, lambda told: told["topic"] == "station" and not told["doing"])
 
 
 @pytest.mark.slow
@@ -207,21 +227,38 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         TYPES, labels, switches=labels[:, None] == 0, switch_names=("s1",), codes=codes, joints=(coding,)
     )
     compile_build(crowd, folder / "build", trainer="linear", folds=0, jobs=1, have=("s1", "j1"), sensors=2)
-    (folder / "glove.toml").write_text(
-        f'name = "bench"\n[[stream]]\nport = "{board[0].port}"\nrate_hz = 200\n'
-        'switches = ["s1"]\njoints = { j1 = [0, 254] }\n'
-    )
+    (folder / "glove.toml").write_text(glove(board[0]))
     Project(folder, hand).remember(build="build")
     opened = studio(None)
-    with page(opened, "collecting,station,adapted,recordings") as live:
+    with page(opened.server.url, "collecting,station,adapted,recordings") as live:
         live.send(json.dumps({"do": "wear"}))
         lead(live, board[1], 1, "wearer")
-        until(live, lambda told: told["topic"] == "station" and not told["doing"])
+        leave(live)
         assert len(read_journal(folder / "me.mcap").accepted) == 1
         assert GraspSet.load(folder / "me.grasps").joints == (coding,)
         (member,) = opened.project.members("recording")
         live.send(json.dumps({"do": "continue", "id": member.id}))
         lead(live, board[1], 4, "recording")
+        leave(live)
         assert until(live, lambda told: told["topic"] == "adapted")["folder"] == "me"
     assert GraspSet.load(folder / "me.grasps").joints == (coding,)
     assert Build.load(folder / "me").manifest.adapted is not None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_what_was_recorded_outlives_the_studio(
+    board: tuple[LineServer, BoardSender], tmp_path: Path, number: signal.Signals
+) -> None:
+    (tmp_path / "glove.toml").write_text(glove(board[0]))
+    command = [sys.executable, "-m", "thenar.cli", "studio", str(tmp_path), "--web", "127.0.0.1:0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        url = process.stderr.readline().rpartition(" ")[2].strip()
+        with page(url, "collecting,station") as live:
+            live.send(json.dumps({"do": "record", "name": "A", "id": "own", "names": TYPES, "value": 2}))
+            lead(live, board[1], 1, "recording")
+            process.send_signal(number)
+            assert process.wait(PATIENCE_S) == (0 if number == signal.SIGINT else -signal.SIGKILL)
+    assert len(read_journal(tmp_path / "A.mcap").accepted) == 1
+    assert (tmp_path / "A.grasps").exists() == (number == signal.SIGINT)
