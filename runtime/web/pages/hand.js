@@ -161,10 +161,10 @@ function spacing(places) {
 
 const VIEW = (38 * Math.PI) / 180;
 const DIGITS = {
-  little: { base: [-31, 78, 0], lean: -13, beside: ["ring", -1], lengths: [36, 21, 18], width: 13 },
-  ring: { base: [-13, 87, 0], lean: -6, beside: ["middle", -1], lengths: [44, 28, 20], width: 14.5 },
+  little: { base: [-31, 78, 0], lean: -13, next: ["ring", -1], lengths: [36, 21, 18], width: 13 },
+  ring: { base: [-13, 87, 0], lean: -6, next: ["middle", -1], lengths: [44, 28, 20], width: 14.5 },
   middle: { base: [6, 91, 0], lean: 0, lengths: [48, 31, 21], width: 15 },
-  index: { base: [25, 87, 0], lean: 6, beside: ["middle", 1], lengths: [43, 26, 20], width: 15 },
+  index: { base: [25, 87, 0], lean: 6, next: ["middle", 1], lengths: [43, 26, 20], width: 15 },
   thumb: { base: [22, 20, 4], lean: 42, lengths: [44, 33, 26], width: 17 },
 };
 const PALM = [[-21, -4, 0], [-34, 40, 0], "little", "ring", "middle", "index", [30, 45, 2], [21, -4, 0]];
@@ -197,9 +197,9 @@ function posed(angles) {
   const arch = Math.sin(radians(at("palm", "arch"))), leans = { middle: at("middle", "abduction") }, chains = {};
   const bases = { ring: [0, 0, 18 * arch], little: [4 * Math.abs(arch), 0, 34 * arch] };
   for (const digit of ["middle", "index", "ring", "little"]) {
-    const { base, lean, lengths, beside } = DIGITS[digit];
-    if (beside) {
-      const [neighbour, side] = beside, spread = at(digit, "abduction", side * (lean - DIGITS[neighbour].lean));
+    const { base, lean, lengths, next } = DIGITS[digit];
+    if (next) {
+      const [neighbour, side] = next, spread = at(digit, "abduction", side * (lean - DIGITS[neighbour].lean));
       leans[digit] = leans[neighbour] + side * spread;
     }
     const angle = radians(leans[digit]), ahead = [Math.sin(angle), Math.cos(angle), 0], curl = at(digit, "curl");

@@ -135,8 +135,9 @@ export class View {
     if (this.switches.length) {
       const names = this.switches.filter((_, bit) => closed[bit]);
       const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
-      const lacking = gone.filter(Boolean).length, readable = lacking ? "readable " : "", besides = lacking ? `; ${lacking} lost` : "";
-      const said = `${names.length} of ${this.switches.length - lacking} ${readable}switches closed${besides}`;
+      const lacking = gone.filter(Boolean).length, readable = this.switches.length - lacking;
+      const counted = lacking ? `${readable} readable switches closed; ${lacking} lost` : `${readable} switches closed`;
+      const said = `${names.length} of ${counted}`;
       say($("hand-says"), `${said}${names.length ? ": " : ""}${names.slice(0, SHOWN).join(", ")}${more}`);
     }
     this.drawing.setClosed(closed, gone);
