@@ -219,11 +219,7 @@ def best_position(node: NodeCounts, columns: NDArray[np.intp]) -> int | None:
     if not varies.any():
         return None
     scores[~varies] = -np.inf
-    # A score has K + 1 terms for each value, whose absolute values are 2 f(n) in sum, since the sum over v of f(n_v) is
-    # at most f(n). An input has at most the values that all cells leave to it.
-    most_values = node.cells.shape[1] - len(node.starts) + 2
-    bound = error_bound(int(node.totals.sum()), (len(node.totals) + 1) * most_values, 2)
-    close = np.flatnonzero(scores >= scores.max() - 2 * bound)
+    close = np.flatnonzero(scores >= scores.max() - 2 * _score_bound(node))
     if len(close) == 1:
         return int(close[0])
     close = close[np.argsort(columns[close])]
@@ -270,6 +266,14 @@ def _scores(node: NodeCounts) -> tuple[Floats, NDArray[np.bool_]]:
         largest = np.maximum.reduceat(largest, node.starts)
     scores = n_log_n(first).sum(axis=0) - n_log_n(first_sizes) + inside
     return scores, np.maximum(largest, first_sizes) < node.totals.sum()
+
+
+def _score_bound(node: NodeCounts) -> float:
+    """Bound the error of a score: it has K + 1 terms for each value, whose absolute values are 2 f(n) in sum, since the
+    sum over v of f(n_v) is at most f(n). An input has at most the values that all cells leave to it.
+    """
+    most_values = node.cells.shape[1] - len(node.starts) + 2
+    return error_bound(int(node.totals.sum()), (len(node.totals) + 1) * most_values, 2)
 
 
 def gain_bits(table: Counts) -> float:
