@@ -15,7 +15,7 @@ const ask = openPage({
   },
   project: ({ builds, sets, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
-    fillMenu($("a"), builds, ids.find((id) => id !== current));
+    fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
     for (const id of ["b", "build"]) fillMenu($(id), builds, current);
     $("no-build").hidden = builds.length > 0;
     // They are compared on all sets unless some are unticked.

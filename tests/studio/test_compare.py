@@ -123,6 +123,14 @@ def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
     assert len(changed) == len(found.changed) >= np.count_nonzero(hits[0] != hits[1]) > 0
 
 
+def test_a_single_build_is_compared_with_none(browser: Browser, project: Studio, folder: Path) -> None:
+    shutil.rmtree(folder / "more")
+    project.changed()
+    begun(browser, project)
+    assert not browser.driver.find_element(By.ID, "compare").is_enabled()
+    assert browser.text("refused") == ""
+
+
 def test_the_hand_shows_which_build_reads_a_sensor(browser: Browser, project: Studio, people: GraspSet) -> None:
     """A sign for both, one for only a, one for only b, and the same in words; a joint is in the words alone."""
     begun(browser, project)
