@@ -123,7 +123,7 @@ def task(guide: CollectionGuide, taxonomy: Taxonomy) -> tuple[str, str]:
 
 
 def standing(guide: CollectionGuide) -> str:
-    """Return what the guide does or waits for now, as a sentence."""
+    """Return the action or the wait of the guide now, as a sentence."""
     if guide.waits:
         return f"the countdown waits: {guide.lost}"
     if guide.stage == "paused":

@@ -262,7 +262,7 @@ class GlovePage:
 
 
 def _state(value: int | None, kind: str, changes: int, others: int) -> str:
-    """Return the state of a sensor that shows `value`, after so many changes of its own, and of others since."""
+    """Return the state of a sensor that shows `value` and changed so often; `others` have changed since."""
     if value is None:
         return "lost"
     if others >= _CHANGES_OF_OTHERS[kind] and (value == 1 if kind == "switch" else changes):

@@ -45,7 +45,7 @@ _MOST_REPETITIONS = 1000
 # Trials of each type that adapt a build; of each, if there is a new one.
 _OFTEN, _TAUGHT = 2, 3
 _SHOW_US = 100_000
-# So many trials of every type have an accuracy.
+# Trials of every type from which on an accuracy is shown.
 _LEAST = 2
 Frames = tuple[SwitchFrame | None, GloveFrame | None]
 
@@ -278,7 +278,7 @@ class RecordPage:
         self._keys.put(asked.name)
 
     def _trial(self, asked: Asked) -> bytes:
-        """Return what was captured in a trial, as the hand shows it."""
+        """Return the captured frames of a trial, as the hand shows them."""
         if asked.trial not in self._captured:
             raise ThenarError(f"trial {asked.trial} was not recorded")
         sensors = GloveSensors(self._project.wiring(), self._project.hand())

@@ -72,7 +72,7 @@ class GloveSensors:
         return DrawnJoint(name, number, "deg" if calibrated else "", low, high, *moved_by(name))
 
     def read(self, switches: SwitchFrame | None, glove: GloveFrame | None) -> list[int | None]:
-        """Return what each sensor shows: 1 or 0, the count of a taxel, the byte of a joint; None: it is not read."""
+        """Return the value of each sensor: 1 or 0, the count of a taxel, the byte of a joint; None: it is not read."""
         kinds = self.kinds
         shown: list[int | None] = [None] * self._switches
         if switches is not None:
@@ -85,7 +85,7 @@ class GloveSensors:
         return shown
 
     def drawn(self, shown: Sequence[int | None]) -> dict[str, object]:
-        """Return what the hand shows: `closed` and `lost` by bit, `pressed` from 0 to 1, and `values` of the joints."""
+        """Return fields of the hand: `closed` and `lost` by bit, `pressed` from 0 to 1, and `values` of the joints."""
         first, last = self._switches, self._switches + len(self._pads)
         return {
             "closed": [value == 1 for value in shown[:first]] + [False] * len(self._pads),

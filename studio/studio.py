@@ -134,7 +134,7 @@ class Studio(Closing):
     def changed(self) -> None:
         """Show the project as it is now, after a set or a build came, went or changed."""
         about, state = tuple[Any, ...](), self.project.state
-        # What is wrong with a build is told by the pages that read it.
+        # What is wrong with a build is shown by the pages that read it.
         with suppress(ThenarError, OSError):
             built = self.project.build()
             about = () if built is None else (built[0], built[1].manifest)
