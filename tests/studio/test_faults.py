@@ -17,6 +17,7 @@ import pytest
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
+from thenar.cli import run
 from thenar.compiler import compile_build
 from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet, Joint
@@ -216,9 +217,13 @@ def leave(live: ClientConnection) -> None:
 
 @pytest.mark.slow
 def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
-    studio: Start, board: tuple[LineServer, BoardSender], hand: HandShape, tmp_path: Path
+    studio: Start,
+    board: tuple[LineServer, BoardSender],
+    hand: HandShape,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Its set has the codes of the build, and adapts it."""
+    """Its set has the codes of the build, and adapts it; the command does not continue it for another build."""
     folder, labels = tmp_path / "recorded", np.arange(40) % 2
     folder.mkdir()
     coding = Joint("j1", "deg", 0, 0.0, 250, 500.0)
@@ -227,6 +232,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         TYPES, labels, switches=labels[:, None] == 0, switch_names=("s1",), codes=codes, joints=(coding,)
     )
     compile_build(crowd, folder / "build", trainer="linear", folds=0, jobs=1, have=("s1", "j1"), sensors=2)
+    compile_build(crowd, tmp_path / "other", trainer="linear", folds=0, jobs=1, have=("s1",), sensors=1)
     (folder / "glove.toml").write_text(glove(board[0]))
     Project(folder, hand).remember(build="build")
     opened = studio(None)
@@ -236,6 +242,9 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         leave(live)
         assert len(read_journal(folder / "me.mcap").accepted) == 1
         assert GraspSet.load(folder / "me.grasps").joints == (coding,)
+        command = ["record", "--glove", folder / "glove.toml", "--subject", "me", "-o", folder / "me.grasps"]
+        assert run([*map(str, command), "--for", str(tmp_path / "other")]) == 2
+        assert "begun with a different value of build" in " ".join(capsys.readouterr().err.split())
         (member,) = opened.project.members("recording")
         live.send(json.dumps({"do": "continue", "id": member.id}))
         lead(live, board[1], 4, "recording")
