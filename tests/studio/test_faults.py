@@ -24,7 +24,10 @@ from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
+from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.guide import read_journal
+from thenar.runtime.recording.session import Label, Session
+from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.web.server import message
 from thenar.studio.project import Project
 from thenar.studio.studio import Station, Studio
@@ -181,6 +184,34 @@ def test_a_bug_frees_the_glove_and_ends_no_studio(studio: Start, caplog: pytest.
         assert until(live, lambda told: told.get("done") == 1)["what"] == "reading"
     assert opened.station.doing == ""
     assert len(caplog.records) == 2
+
+
+def test_a_recording_that_went_on_is_shown_as_it_is_now(
+    studio: Start, two_builds: Path, people: GraspSet, tmp_path: Path
+) -> None:
+    folder = tmp_path / "recorded"
+    shutil.copytree(two_builds, folder)
+    opened, path = studio(None), folder / "rec.mcap"
+    for trials in (1, 2):
+        path.unlink(missing_ok=True)
+        with Recorder(path, Session(thenar="1", switches=people.switch_names, sensors=())) as recorder:
+            for time_us in range(0, trials * 1_000_000, 10_000):
+                if time_us % 1_000_000 == 0:
+                    recorder.label(Label(time_us, "begun", 1 + time_us // 1_000_000, "cup", "A", "cup"))
+                recorder.frame(SwitchFrame(time_us, 1))
+                if time_us % 1_000_000 == 990_000:
+                    recorder.label(Label(time_us, "accepted", 1 + time_us // 1_000_000, "cup", "A", "cup"))
+        ids = [one.id for kind in ("recording", "build") for one in opened.project.members(kind)][:2]
+        with page(opened.server.url, "none") as live:
+            live.send(json.dumps({"do": "replay", "ids": ids}))
+            until(live, lambda told: told["topic"] == "replay")
+        share, truth = 0.0, list[object]()
+        while share < 1:
+            with page(opened.server.url, "none") as live:
+                live.send(json.dumps({"do": "overview", "ids": ids, "numbers": [0, 0]}))
+                told = until(live, lambda told: told["topic"] == "overview")
+                share, truth = told["share"], told["truth"]
+        assert len(truth) == trials
 
 
 TYPES = ("cup", "pen")
