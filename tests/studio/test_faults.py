@@ -17,13 +17,17 @@ import pytest
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
+from thenar.cli import run
 from thenar.compiler import compile_build
 from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
+from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.guide import read_journal
+from thenar.runtime.recording.session import Label, Session
+from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.web.server import message
 from thenar.studio.project import Project
 from thenar.studio.studio import Station, Studio
@@ -182,6 +186,34 @@ def test_a_bug_frees_the_glove_and_ends_no_studio(studio: Start, caplog: pytest.
     assert len(caplog.records) == 2
 
 
+def test_a_recording_that_went_on_is_shown_as_it_is_now(
+    studio: Start, two_builds: Path, people: GraspSet, tmp_path: Path
+) -> None:
+    folder = tmp_path / "recorded"
+    shutil.copytree(two_builds, folder)
+    opened, path = studio(None), folder / "rec.mcap"
+    for trials in (1, 2):
+        path.unlink(missing_ok=True)
+        with Recorder(path, Session(thenar="1", switches=people.switch_names, sensors=())) as recorder:
+            for time_us in range(0, trials * 1_000_000, 10_000):
+                if time_us % 1_000_000 == 0:
+                    recorder.label(Label(time_us, "begun", 1 + time_us // 1_000_000, "cup", "A", "cup"))
+                recorder.frame(SwitchFrame(time_us, 1))
+                if time_us % 1_000_000 == 990_000:
+                    recorder.label(Label(time_us, "accepted", 1 + time_us // 1_000_000, "cup", "A", "cup"))
+        ids = [one.id for kind in ("recording", "build") for one in opened.project.members(kind)][:2]
+        with page(opened.server.url, "none") as live:
+            live.send(json.dumps({"do": "replay", "ids": ids}))
+            until(live, lambda told: told["topic"] == "replay")
+        share, truth = 0.0, list[object]()
+        while share < 1:
+            with page(opened.server.url, "none") as live:
+                live.send(json.dumps({"do": "overview", "ids": ids, "numbers": [0, 0]}))
+                told = until(live, lambda told: told["topic"] == "overview")
+                share, truth = told["share"], told["truth"]
+        assert len(truth) == trials
+
+
 TYPES = ("cup", "pen")
 CLOSED = {"cup": {"s1": 1.0, "j1": 40.0}, "pen": {"s1": 0.0, "j1": 200.0}}
 
@@ -216,9 +248,13 @@ def leave(live: ClientConnection) -> None:
 
 @pytest.mark.slow
 def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
-    studio: Start, board: tuple[LineServer, BoardSender], hand: HandShape, tmp_path: Path
+    studio: Start,
+    board: tuple[LineServer, BoardSender],
+    hand: HandShape,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Its set has the codes of the build, and adapts it."""
+    """Its set has the codes of the build, and adapts it; the command does not continue it for another build."""
     folder, labels = tmp_path / "recorded", np.arange(40) % 2
     folder.mkdir()
     coding = Joint("j1", "deg", 0, 0.0, 250, 500.0)
@@ -227,6 +263,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         TYPES, labels, switches=labels[:, None] == 0, switch_names=("s1",), codes=codes, joints=(coding,)
     )
     compile_build(crowd, folder / "build", trainer="linear", folds=0, jobs=1, have=("s1", "j1"), sensors=2)
+    compile_build(crowd, tmp_path / "other", trainer="linear", folds=0, jobs=1, have=("s1",), sensors=1)
     (folder / "glove.toml").write_text(glove(board[0]))
     Project(folder, hand).remember(build="build")
     opened = studio(None)
@@ -236,6 +273,9 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         leave(live)
         assert len(read_journal(folder / "me.mcap").accepted) == 1
         assert GraspSet.load(folder / "me.grasps").joints == (coding,)
+        command = ["record", "--glove", folder / "glove.toml", "--subject", "me", "-o", folder / "me.grasps"]
+        assert run([*map(str, command), "--for", str(tmp_path / "other")]) == 2
+        assert "begun with a different value of build" in " ".join(capsys.readouterr().err.split())
         (member,) = opened.project.members("recording")
         live.send(json.dumps({"do": "continue", "id": member.id}))
         lead(live, board[1], 4, "recording")
