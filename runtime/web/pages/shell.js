@@ -20,7 +20,7 @@ export function openPage(handlers) {
   const pages = make("nav", { id: "pages", "aria-label": "Pages" });
   document.head.append(make("link", { rel: "icon", href: "icon.svg" }));
   const cancel = button("Cancel", () => send({ do: "cancel" }), { id: "cancel", class: "plain", hidden: true });
-  const busy = make("p", { class: "row" }, make("span", { id: "work", role: "status" }), cancel);
+  const busy = make("p", { class: "row" }, make("span", { id: "work" }), cancel);
   const refused = make("p", { id: "refused", role: "alert" });
   document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages, busy, refused));
   badge("link", "bad", "page: connecting");
@@ -69,6 +69,7 @@ let working = null; // what is done now, and when it will be finished
 
 function work({ done, total, what, why, left_s: left }) {
   working = done < total ? { what, share: done / total, end: left == null ? null : performance.now() + 1000 * left } : null;
+  $("work").role = "status"; // a server without work has nothing there to be read out
   $("cancel").hidden = !working || what === "reading";
   if (working) countDown();
   else say($("work"), why ?? "");
