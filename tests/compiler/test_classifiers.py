@@ -42,11 +42,3 @@ def test_a_missing_input_is_refused() -> None:
         classifier.fit(inputs, labels)
     with pytest.raises(ValueError, match="contains NaN"):
         classifier.fit(inputs[:4], labels[:4]).predict(inputs)
-
-
-def test_staged_decisions_end_where_decisions_are() -> None:
-    classifier = LogitBoostClassifier(rounds=7).fit(X, Y)
-    stages = list(classifier.staged_decision_function(X))
-    assert len(stages) == classifier.n_rounds_ == 7
-    assert np.array_equal(stages[-1], classifier.decision_function(X))
-    assert len(classifier.losses_) == 8
