@@ -137,13 +137,15 @@ def _scale_times(axes: "Axes", us: Iterable[float]) -> None:
 
 
 def _round_times(low: float, high: float) -> list[float]:
-    """Return 1, 2 and 5 times powers of ten from low to high; only powers if there would be too many."""
+    """Return 1, 2 and 5 times powers of ten from low to high; only powers if there would be too many. A range without
+    any has its middle.
+    """
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     for steps in ((1, 2, 5), (1,)):
         ticks = [tick for power in powers for step in steps if low <= (tick := step * 10.0**power) <= high]
         if len(ticks) <= 5:
             break
-    return ticks[:: -(-len(ticks) // 5)]
+    return ticks[:: -(-len(ticks) // 5)] if ticks else [math.sqrt(low * high)]
 
 
 def _scale_rates(axes: "Axes", shown: Sequence[tuple[float, float]], by: str) -> None:

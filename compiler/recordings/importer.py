@@ -114,18 +114,15 @@ def import_table(table: Table, columns: ColumnRoles) -> tuple[GraspSet, ImportRe
         simulated=columns.simulated,
     )
     grasp_set, alike = _trials_by_name(grasp_set, columns)
-    owner = groups(readings.subjects, readings.sessions)
-    group = groups(owner, readings.labels, readings.objects)
-    time = None if columns.time is None or not np.isfinite(readings.time).all() else readings.time
-    trial_ids = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
-    course = Course(owner, group, trial_ids, time, columns.time or "")
     warnings += [
         *alike,
         *check_trials(grasp_set, TableError),
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),
-        *possible_clocks(zip((name for name, _ in selection.coded), readings.joints.T, strict=True), course),
+        *possible_clocks(
+            zip((name for name, _ in selection.coded), readings.joints.T, strict=True), _course(readings, columns)
+        ),
     ]
     if taxels:
         notes.append(
@@ -160,6 +157,15 @@ def _renamed(table: Table, rename: dict[str, str]) -> Table:
     names = list((dict(zip(names, names, strict=True)) | rename).values())
     check_names("rename: column", names)
     return replace(table, columns=dict(zip(names, table.columns.values(), strict=True)))
+
+
+def _course(readings: Readings, columns: ColumnRoles) -> Course:
+    """Return the order of the rows, for the search for clocks among the inputs."""
+    owner = groups(readings.subjects, readings.sessions)
+    group = groups(owner, readings.labels, readings.objects)
+    time = None if columns.time is None or not np.isfinite(readings.time).all() else readings.time
+    trial_ids = np.arange(len(owner)) if columns.frames == "independent" else groups(group, readings.trials)
+    return Course(owner, group, trial_ids, time, columns.time or "")
 
 
 def report_of(

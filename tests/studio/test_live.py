@@ -221,7 +221,7 @@ def test_without_builds_and_a_run_nothing_empty_is_shown(browser: Browser, studi
     """Menus without members and parts without data are not there, and a sentence says what to do."""
     server = studio().server
     browser.open(f"{server.url}live.html")
-    browser.wait(lambda: browser.text("lacking").startswith("The project has no build yet: train one on "))
+    browser.wait(lambda: "The project has no build yet: train one on " in "".join(browser.texts("#lacking")))
     for name in (
         "health",
         "timeline",

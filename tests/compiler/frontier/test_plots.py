@@ -9,13 +9,15 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from msgspec.structs import replace
 
-from thenar.compiler.frontier.plots import draw, picture
+from thenar.compiler.frontier.plots import _round_times, draw, picture
 from thenar.compiler.frontier.points import Frontier, PointTime, ReferencePoint
 from thenar.compiler.pictures import painting
 
@@ -164,3 +166,11 @@ def test_the_axis_mentions_an_unknown_time_of_joints(examples: Any) -> None:
     points = tuple(replace(point, transfer=PointTime(0.0, "unknown")) for point in found.points)
     unknown = replace(found, points=points)
     assert "reading the joints is left out" in _drawn(unknown).axes[0].get_xlabel().replace("\n", " ")
+
+
+@given(st.floats(0.01, 1e8), st.floats(1.3, 1e6))
+def test_a_range_of_times_has_one_to_five_round_ones(low: float, times: float) -> None:
+    ticks = _round_times(low, low * times)
+    assert 1 <= len(ticks) <= 5
+    assert all(low <= tick <= low * times for tick in ticks)
+    assert times < 2.6 or all(f"{tick:.3e}"[:5] in ("1.000", "2.000", "5.000") for tick in ticks)
