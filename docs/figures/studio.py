@@ -51,12 +51,12 @@ def page(folder: Path) -> Iterator[str]:
 @contextmanager
 def choose_page(folder: Path) -> Iterator[str]:
     """Yield the address of the page on which sensors are chosen."""
-    thenar, grasps = [sys.executable, "-m", "thenar.cli"], str(folder / "set.grasps")
-    subprocess.run(
-        [*thenar, "simulate", "kamakura", "--repetitions", "10", "-o", grasps], check=True, capture_output=True
-    )
-    command = [*thenar, "studio", str(folder), "--web", "127.0.0.1:0"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+    thenar = [sys.executable, "-m", "thenar.cli"]
+    (folder / "kamakura").mkdir()
+    simulate = ["simulate", "kamakura", "--repetitions", "10", "-o", "kamakura/set.grasps"]
+    subprocess.run([*thenar, *simulate], check=True, capture_output=True, cwd=folder)
+    command = [*thenar, "studio", "kamakura", "--web", "127.0.0.1:0"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
         try:
             assert process.stderr is not None
             yield next(line.partition("the page is at ")[2].strip() for line in process.stderr)
@@ -96,7 +96,8 @@ def main() -> None:
             if options.choose:
                 choose_sensors(driver, wait)
             else:
-                sized["height"] = driver.execute_script("return document.documentElement.scrollHeight")
+                wait.until(lambda _: driver.execute_script(_READY, GRASPS))
+                sized["height"] = driver.execute_script("return document.body.scrollHeight")
                 driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
                 wait.until(lambda _: driver.execute_script(_READY, GRASPS))
             with Image.open(BytesIO(driver.get_screenshot_as_png())) as taken:
