@@ -91,7 +91,7 @@ class Members(Mapping[str, M], Generic[M]):
 
     def _loaded(self, point: "EntryPoint") -> M:
         try:
-            member: M = point.load()
+            member: object = point.load()
         except KeyboardInterrupt:
             raise
         except BaseException as error:
@@ -100,8 +100,7 @@ class Members(Mapping[str, M], Generic[M]):
             said = f"cannot be loaded: {shortened(what)}; fix or uninstall it"
             raise SettingError(f"{self._where(point)} {said}") from error
         derives = self.base is None or (isinstance(member, type) and issubclass(member, self.base))
-        fits = isinstance(member, self.shape) and derives
-        if not fits:
+        if not (isinstance(member, self.shape) and derives):
             wanted = f"a {self.shape.__name__}" if self.base is None else f"a class derived from {self.base.__name__}"
             said = f"is not {wanted}: docs/how-to/extend.md says what to define"
             raise SettingError(f"{self._where(point)} {said}")
