@@ -6,6 +6,7 @@ with nested folds or the curve of what sensors are worth, is queued, and its res
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from shlex import quote
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
+from thenar.compiler.glove.prices import Part
 from thenar.compiler.hand import HandShape, moved_by
 from thenar.compiler.placement.constraints import Limits
 from thenar.compiler.placement.elements import elements_of, names_of
@@ -34,14 +36,48 @@ from .studio import Asked, Handler, Report, Studio
 _BUILD = "build"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Recordings:
+    """The sets in use as one, and what follows from them. It is replaced as a whole: no request sees a part of it.
+
+    quick      the accuracy of any sensors
+    trials     the trials as they were recorded, by their numbers on pages
+    numbering  what pages call this numbering
+    hand       the glove laid flat, if it has the positions of the sensors
+    parts      the part for each sensor, by its name; empty without a price list
+    levels     the element that a switch or a pad is read as, by its name: itself, or a level
+    """
+
+    grasp_set: GraspSet
+    quick: QuickAccuracy
+    trials: list[TrialId]
+    numbering: str
+    hand: HandShape | None
+    parts: dict[str, Part]
+    levels: dict[str, str]
+
+    @property
+    def files(self) -> list[str]:
+        """The names of the sets."""
+        return list(dict.fromkeys(file for file, *_ in self.trials))
+
+    @property
+    def prices(self) -> dict[str, float]:
+        """The price of each sensor, by its name; empty without a price list."""
+        return {name: part.price for name, part in self.parts.items()}
+
+    def names(self, sensors: Sequence[int]) -> tuple[str, ...]:
+        """Return the names of sensors, each once, in this order. Raises EvaluationError if there is no such number."""
+        self.quick.check(sensors)
+        return tuple(dict.fromkeys(self.quick.names[sensor] for sensor in sensors))
+
+
 class ChoosePage:
     """The page *Choose* of a studio."""
 
     def __init__(self, studio: Studio) -> None:
         self._studio, self._project = studio, studio.project
-        self._quick: QuickAccuracy | None = None
-        # The trials as they were recorded, by their numbers on pages, and what pages call this numbering.
-        self.numbered: tuple[list[TrialId], str] = ([], "")
+        self._recordings: Recordings | None = None
         requests: dict[str, Handler] = {
             "choose": lambda asked: self._reply(asked.sensors),
             "add": lambda asked: self._found("add", asked.sensors),
@@ -54,60 +90,49 @@ class ChoosePage:
     def read(self, report: Report) -> None:
         """Read the project's recordings, and show them; until then pages get those before."""
         try:
-            grasp_set, trials, unused = self._project.recordings()
-            self._hand = self._project.hand().fitted(grasp_set.element_names)
-            self._parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
+            grasp_set, rows, unused = self._project.recordings()
+            hand = self._project.hand().fitted(grasp_set.element_names)
+            parts = self._project.parts((*grasp_set.element_names, *grasp_set.joint_names))
             quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
-            self._quick = None
+            self._recordings = None
             self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
             return
-        self._set, self._quick = grasp_set, quick
-        of_rows = [trial for trial, none in zip(trials, grasp_set.is_none.tolist(), strict=True) if not none]
+        of_rows = [trial for trial, none in zip(rows, grasp_set.is_none.tolist(), strict=True) if not none]
         ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
-        said = msgspec.json.encode((ids, grasp_set.fingerprint()))
-        self.numbered = ids, hashlib.sha256(said).hexdigest()[:12]
-        self._prices = {name: part.price for name, part in self._parts.items()}
-        self._levels = self._levels_of()
+        numbering = hashlib.sha256(msgspec.json.encode((ids, grasp_set.fingerprint()))).hexdigest()[:12]
+        now = Recordings(grasp_set, quick, ids, numbering, hand, parts, _levels(grasp_set))
+        self._recordings = now
         kinds = ["switch"] * len(grasp_set.switch_names) + ["pad"] * len(grasp_set.taxel_columns)
         kinds += ["joint"] * len(grasp_set.joints)
         about = {
             "why": "",
-            "name": ", ".join(self._files),
+            "name": ", ".join(now.files),
             "unused": unused,
             "grasps": quick.grasps,
-            "types": self.types,
-            "taxonomy": self._set.taxonomy.name,
+            "types": quick.held.taxonomy.types,
+            "taxonomy": grasp_set.taxonomy.name,
             "joints": _joints(quick.held),
             "trials": _names(ids),
-            "numbering": self.numbered[1],
+            "numbering": numbering,
             "sensors": [
-                {"name": name, "kind": kind, "price": self._prices.get(name)}
+                {"name": name, "kind": kind, "price": now.prices.get(name)}
                 for name, kind in zip(quick.names, kinds, strict=True)
             ],
         }
-        self._studio.publish("sensors", message("sensors", drawn(grasp_set, self._hand)))
+        self._studio.publish("sensors", message("sensors", drawn(grasp_set, hand)))
         self._studio.publish("set", message("set", about))
 
     @property
-    def _files(self) -> list[str]:
-        """The names of the sets that are used."""
-        return list(dict.fromkeys(file for file, *_ in self.numbered[0]))
-
-    @property
-    def types(self) -> tuple[str, ...]:
-        """The grasp types that a trial may be of. Raises ThenarError before the recordings are read."""
-        return self.known.held.taxonomy.types
-
-    @property
-    def known(self) -> QuickAccuracy:
-        """The accuracies of the recordings. Raises ThenarError before they are read."""
-        if self._quick is None:
+    def recordings(self) -> Recordings:
+        """The recordings as they were last read. Raises ThenarError before that, and if they cannot be read."""
+        if self._recordings is None:
             raise ThenarError("the recordings are not read yet")
-        return self._quick
+        return self._recordings
 
     def _found(self, do: str, sensors: tuple[int, ...]) -> bytes:
-        find = self.known.best_next if do == "add" else self.known.least
+        quick = self.recordings.quick
+        find = quick.best_next if do == "add" else quick.least
         return message(do, sensor=find(sensors), sensors=sensors)
 
     def _use(self, asked: Asked) -> None:
@@ -119,77 +144,78 @@ class ChoosePage:
     def _later(self, asked: Asked) -> None:
         if asked.do != "curve" and not asked.sensors:
             raise ThenarError("choose a sensor first: without any, nothing can be learnt")
-        self._studio.queue(asked.do, partial(self._measure, asked, self._names(asked.sensors)))
-
-    def _names(self, sensors: Sequence[int]) -> tuple[str, ...]:
-        """Return the names of sensors, each once, in this order. Raises EvaluationError if there is no such number."""
-        self.known.check(sensors)
-        return tuple(dict.fromkeys(self.known.names[sensor] for sensor in sensors))
+        names = self.recordings.names(asked.sensors)
+        self._studio.queue(asked.do, partial(self._measure, asked, names))
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
-        names = self._names(sensors)
+        now = self.recordings
+        names = now.names(sensors)
         return message(
             "quick",
-            self.known.of(sensors),
+            now.quick.of(sensors),
             sensors=sensors,
-            scan_us=scan_time_us([self._levels[name] for name in names if name in self._levels]),
-            price=sum(self._prices[name] for name in names) if self._prices else None,
-            command=self._command(names),
+            scan_us=scan_time_us([now.levels[name] for name in names if name in now.levels]),
+            price=sum(now.prices[name] for name in names) if now.parts else None,
+            command=self._command(now.files, names),
         )
 
-    def _command(self, names: Sequence[str]) -> str:
-        """Return the commands that compile a build of these sensors."""
+    def _command(self, files: Sequence[str], names: Sequence[str]) -> str:
+        """Return the commands that compile a build of these sensors from these sets."""
         if not names:
             return ""
-        first, recordings = self._project.joined([self._project.folder / name for name in self._files])
+        first, recordings = self._project.joined([self._project.folder / name for name in files])
         have, more = quote(",".join(names)), "".join(f" {quote(option)}" for option in self._project.options())
         output = quote(str(self._project.new_path(_BUILD)))
         return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
-
-    def _levels_of(self) -> dict[str, str]:
-        """Return the element that a switch or a pad is read as, by its name: itself, or a level."""
-        held = self._set.without_none()
-        elements = elements_of(Samples.of(held), 1)
-        every = self._set.element_names
-        return {every[one.column]: name for one, name in zip(elements, names_of(held, elements), strict=True)}
 
     def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> None:
         """Measure the curve, or the accuracy of chosen sensors, or train a build of these; tell all pages.
 
         Raises ThenarError if their numbers mean other sensors by now.
         """
-        if self._names(asked.sensors) != names:
+        now = self.recordings
+        if now.names(asked.sensors) != names:
             raise ThenarError("the recordings have other sensors now: choose again")
         recipe = Recipe() if asked.do == "curve" else Recipe(sensors=len(names), have=names)
         many: dict[str, Any] = {"jobs": self._studio.jobs}
         if asked.do == "train":
             output = self._project.new_path(_BUILD)
-            documents = Documents(self._hand, parts=self._parts)
-            built = compile_build(self._set, output, recipe, documents=documents, progress=report, **many)
+            documents = Documents(now.hand, parts=now.parts)
+            built = compile_build(now.grasp_set, output, recipe, documents=documents, progress=report, **many)
             content: dict[str, Any] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
             self._project.remember(build=output.name)
             self._studio.changed()
         else:
-            limits = Limits.of(recipe, self._set, {}, prices=self._prices)
-            content = self._content(study_sensors(self._set, recipe, limits=limits, report=report, **many))
-        content |= {"sensors": asked.sensors, "numbering": self.numbered[1]}
+            limits = Limits.of(recipe, now.grasp_set, {}, prices=now.prices)
+            study = study_sensors(now.grasp_set, recipe, limits=limits, report=report, **many)
+            content = _content(study, now.quick.names)
+        content |= {"sensors": asked.sensors, "numbering": now.numbering}
         self._studio.publish(asked.do, message(asked.do, content))
 
-    def _content(self, study: SensorStudy) -> dict[str, object]:
-        numbers = {name: number for number, name in enumerate(self.known.names)}
-        return {
-            "of": study.of,
-            "enough": study.enough,
-            "recipe": str(study.recipe),
-            "points": [
-                {
-                    "sensors": [numbers[name] for name in point.sensors],
-                    **{name: getattr(point, name) for name in ("mean", "low", "high", "adapted", "papers")},
-                    "worth": "" if point.worth is None else str(point.worth),
-                }
-                for point in study.points
-            ],
-        }
+
+def _levels(grasp_set: GraspSet) -> dict[str, str]:
+    held = grasp_set.without_none()
+    elements = elements_of(Samples.of(held), 1)
+    every = grasp_set.element_names
+    return {every[one.column]: name for one, name in zip(elements, names_of(held, elements), strict=True)}
+
+
+def _content(study: SensorStudy, names: Sequence[str]) -> dict[str, object]:
+    """Return what pages show of a study, whose sensors have numbers in the order of `names`."""
+    numbers = {name: number for number, name in enumerate(names)}
+    return {
+        "of": study.of,
+        "enough": study.enough,
+        "recipe": str(study.recipe),
+        "points": [
+            {
+                "sensors": [numbers[name] for name in point.sensors],
+                **{name: getattr(point, name) for name in ("mean", "low", "high", "adapted", "papers")},
+                "worth": "" if point.worth is None else str(point.worth),
+            }
+            for point in study.points
+        ],
+    }
 
 
 def _joints(held: GraspSet) -> list[DrawnJoint]:

@@ -36,11 +36,13 @@ def add_compare_page(studio: Studio) -> None:
 
 
 def _chosen(studio: Studio, asked: Asked) -> tuple[list[Path], list[Path]]:
-    """Return two builds, and sets, or all in use. Raises SettingError for other ids."""
+    """Return two builds, and sets, or all in use. Raises SettingError for other ids, and without a set."""
     if len(asked.ids) < 2 or asked.ids[0] == asked.ids[1]:
         raise SettingError("choose two builds to compare")
-    sets = [studio.project.path("set", member) for member in asked.ids[2:]]
-    return [studio.project.path("build", member) for member in asked.ids[:2]], sets or studio.project.sets()
+    sets = [studio.project.path("set", member) for member in asked.ids[2:]] or studio.project.sets()
+    if not sets:
+        raise SettingError("the project has no recordings in use, on which builds could be compared")
+    return [studio.project.path("build", member) for member in asked.ids[:2]], sets
 
 
 def _later(studio: Studio, asked: Asked) -> None:

@@ -114,7 +114,7 @@ class ErrorsPage:
         self._build, name, why = None, "", ""
         try:
             if (built := self._project.build()) is not None:
-                self._build, name = BuildReading(built[0].name, built[1], self._choose.known), built[0].name
+                self._build, name = BuildReading(built[0].name, built[1], self._choose.recordings.quick), built[0].name
         except (ThenarError, OSError) as reason:
             why = f"build {self._project.state.build} is left out: {reason}"
         self._studio.publish("recogniser", message("recogniser", build=name, why=why))
@@ -122,21 +122,23 @@ class ErrorsPage:
 
     def _errors(self, asked: Asked) -> bytes:
         """Return as which type the sensors, or the build, recognise every trial."""
-        quick, sensors = self._choose.known, asked.sensors
+        now, sensors = self._choose.recordings, asked.sensors
+        quick = now.quick
         if asked.name == "build":
-            sensors = self._reading.sensors
-            about = {"types": self._reading.types, "read": self._reading.read.tolist(), **self._reading.about}
+            reading = self._reading
+            sensors = reading.sensors
+            about = {"types": reading.types, "read": reading.read.tolist(), **reading.about}
         else:
             found = quick.of(sensors)
             about = {"types": quick.grasps, "read": found.read, "mean": found.mean, "low": found.low}
             about |= {"high": found.high, "of": f"{found.of}; quick: not nested"}
         places = quick.places(sensors).tolist()
-        about |= {"truth": quick.truth.tolist(), "places": places, "numbering": self._choose.numbered[1]}
+        about |= {"truth": quick.truth.tolist(), "places": places, "numbering": now.numbering}
         return message("errors", about, sensors=sensors, asked=(asked.name, asked.sensors))
 
     def _trials(self, asked: Asked) -> bytes:
         """Return the values of sensors in trials, and which decided where one was misread."""
-        quick, shown = self._choose.known, list[dict[str, object]]()
+        quick, shown = self._choose.recordings.quick, list[dict[str, object]]()
         typical = {kind: [*map(float, shares)] for kind, shares in zip(quick.grasps, quick.typical, strict=True)}
         for trial in asked.trials[:_MOST_SHOWN]:
             decisive = self._reading.decisive(trial) if asked.name == "build" else quick.decisive(trial, asked.sensors)
@@ -158,14 +160,14 @@ class ErrorsPage:
         if asked.do == "undo":
             undo(log)
         else:
-            trials, numbering = self._choose.numbered
-            if asked.id != numbering:
+            now = self._choose.recordings
+            if asked.id != now.numbering:
                 raise ThenarError("the recordings have changed: look at these trials again")
-            if not all(0 <= trial < len(trials) for trial in asked.trials):
-                raise ThenarError(f"there are {len(trials)} trials, numbered from 0")
-            if asked.name not in ("", *self._choose.types):
+            if not all(0 <= trial < len(now.trials) for trial in asked.trials):
+                raise ThenarError(f"there are {len(now.trials)} trials, numbered from 0")
+            if asked.name not in ("", *now.quick.held.taxonomy.types):
                 raise ThenarError(f"{shortened(repr(asked.name))} is not a grasp type of these recordings")
-            change(log, [trials[trial] for trial in asked.trials], asked.name)
+            change(log, [now.trials[trial] for trial in asked.trials], asked.name)
         self._tell_edits()
         self._studio.changed()
 

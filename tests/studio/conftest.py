@@ -13,6 +13,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.drivers.emulated.lines import LineServer
 from thenar.runtime.recipe import Recipe
 from thenar.simulator.handmaps.handmap import hand_map
 from thenar.studio.opening import open_studio
@@ -80,6 +81,13 @@ def studio(people: GraspSet, hand: HandShape, tmp_path: Path) -> Iterator[Callab
             return opened
 
         yield start
+
+
+@pytest.fixture
+def line() -> Iterator[LineServer]:
+    """Return a server of lines on TCP, to which an emulated board can send."""
+    with LineServer() as line:
+        yield line
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from thenar.cli import run
 from thenar.compiler.artifact.sensor_study import study_sensors
@@ -29,39 +27,21 @@ from thenar.studio.studio import Report, Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of
+from .sockets import PATIENCE_S, page, reply, until
 
 Start = Callable[..., Studio]
-PATIENCE_S = 30
 PRICES = '[[part]]\nname = "plain"\nprice = 2.5\nsensors = ["*"]\n'
 
 
 def answers(opened: Studio, *asked: dict[str, Any]) -> list[dict[str, Any]]:
     """Return what a page is told of its set and its sensors and, in this order, on what it asks for."""
-    parts = urlsplit(opened.server.url)
-    address, origin = f"ws://{parts.netloc}/live?topics=sensors,set", Origin(f"http://{parts.netloc}")
-    with connect(address, origin=origin, compression=None, proxy=None) as live:
+    with page(opened.server.url, "sensors,set") as live:
         found = [json.loads(live.recv(timeout=PATIENCE_S)) for _ in range(2)]
         for one in asked:
             live.send(json.dumps(one))
             # What was told on opening may come once more.
-            while (told := json.loads(live.recv(timeout=PATIENCE_S)))["topic"] in ("sensors", "set"):
-                pass
-            found.append(told)
+            found.append(until(live, lambda told: told["topic"] not in ("sensors", "set")))
         return found
-
-
-def until(
-    opened: Studio, asked: dict[str, Any], topic: str, enough: Callable[[dict[str, Any]], bool]
-) -> dict[str, Any]:
-    """Return the first message of a topic after what is asked for that is enough."""
-    answers(opened)
-    parts = urlsplit(opened.server.url)
-    with connect(f"ws://{parts.netloc}/live", origin=Origin(f"http://{parts.netloc}"), proxy=None) as live:
-        live.send(json.dumps(asked))
-        while True:
-            told = json.loads(live.recv(timeout=PATIENCE_S))
-            if told["topic"] == topic and enough(told):
-                return dict(told)
 
 
 def counts(browser: Browser, number: int) -> None:
@@ -188,11 +168,12 @@ def test_work_that_the_machine_fails_is_told_and_ends_nothing(
     def failing(*_arguments: object, **_options: object) -> None:
         raise fault
 
-    page = studio()
+    opened = studio()
+    answers(opened)
     with monkeypatch.context() as patched:
         patched.setattr("thenar.studio.choose.study_sensors", failing)
-        assert until(page, {"do": "curve"}, "work", lambda work: "why" in work)["why"] == str(fault)
-    assert until(page, {"do": "measure", "sensors": [0]}, "measure", bool)["sensors"] == [0]
+        assert reply(opened, {"do": "curve"}, "work", "why")["why"] == str(fault)
+    assert reply(opened, {"do": "measure", "sensors": [0]}, "measure")["sensors"] == [0]
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
@@ -308,7 +289,8 @@ def test_the_command_applies_the_edits_and_can_be_run(studio: Start, people: Gra
     opened, folder = studio(), tmp_path / "recorded"
     change(folder / "edits.jsonl", trials_of("set.grasps", people)[:5], "")
     opened.changed()
-    command = until(opened, {"do": "choose", "sensors": [0, 8]}, "quick", lambda quick: "merge" in quick["command"])
+    answers(opened)
+    command = reply(opened, {"do": "choose", "sensors": [0, 8]}, "quick")
     merge, compiled = command["command"].split(" && ")
     sets = f"{folder}/set.grasps --edits {folder}/edits.jsonl"
     assert merge == f"thenar merge {sets} -o {tmp_path}/recorded.grasps"

@@ -16,8 +16,6 @@ import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from thenar.cli import run
 from thenar.compiler.artifact.comparing import compare_builds
@@ -27,9 +25,9 @@ from thenar.runtime import Build
 from thenar.studio.studio import Studio
 
 from ..browser import Browser
+from .sockets import reply
 
 Start = Callable[..., Studio]
-PATIENCE_S = 30
 
 
 @pytest.fixture
@@ -77,17 +75,6 @@ def ids(opened: Studio, kind: str) -> dict[str, str]:
     return {one.name: one.id for one in opened.project.members(kind)}
 
 
-def asked(opened: Studio, request: dict[str, Any], topic: str) -> dict[str, Any]:
-    """Return the first message of a topic, or the refusal, after a request."""
-    address = opened.server.url.removeprefix("http://").rstrip("/")
-    with connect(f"ws://{address}/live?topics={topic}", origin=Origin(f"http://{address}"), proxy=None) as live:
-        live.send(json.dumps(request))
-        while True:
-            told = json.loads(live.recv(timeout=PATIENCE_S))
-            if told["topic"] in (topic, "refused"):
-                return dict(told)
-
-
 def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
     browser: Browser, project: Studio, folder: Path, people: GraspSet
 ) -> None:
@@ -121,6 +108,13 @@ def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
     ]
     changed = rows(browser, "changed")
     assert len(changed) == len(found.changed) >= np.count_nonzero(hits[0] != hits[1]) > 0
+
+
+def test_without_recordings_nothing_is_compared(project: Studio, folder: Path) -> None:
+    (folder / "set.grasps").unlink()
+    for request in ("compare", "comparison"):
+        refused = reply(project, {"do": request, "ids": [*ids(project, "build").values()]})
+        assert "no recordings in use" in refused["why"]
 
 
 def test_a_single_build_is_compared_with_none(browser: Browser, project: Studio, folder: Path) -> None:
@@ -231,7 +225,7 @@ def test_two_browsers_do_not_move_each_other(browser: Browser, project: Studio) 
     begun(browser, project)
     chosen = [str(browser.script("return document.getElementById(arguments[0]).value", one)) for one in "ba"]
     request = {"do": "compare", "ids": [*chosen, *ids(project, "set").values()]}
-    assert asked(project, request, "compare")["ids"] == request["ids"]
+    assert reply(project, request, "compare")["ids"] == request["ids"]
     browser.click("report")
     browser.wait(lambda: browser.text("exported"))
     assert not browser.driver.find_element(By.ID, "result").is_displayed()
@@ -271,7 +265,7 @@ def test_what_a_page_may_not_ask_for_is_refused(
         value = request_.get(key, "")
         new = known.get(value, value) if isinstance(value, str) else [known.get(one, one) for one in value]
         request_ = request_ | {key: new} if key in request_ else request_
-    refused = asked(project, request_, "compare")
+    refused = reply(project, request_, "compare")
     assert refused["topic"] == "refused"
     assert said in refused["why"]
     assert sorted(folder.iterdir()) == before

@@ -7,15 +7,13 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 from typing import Any
 
 import numpy as np
 import pytest
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin
+from websockets.sync.client import ClientConnection
 
 from thenar.cli import run
 from thenar.compiler import compile_build
@@ -33,30 +31,14 @@ from thenar.studio.project import Project
 from thenar.studio.studio import Station, Studio
 
 from ..sets import grasp_set_of
+from .sockets import PATIENCE_S, page, reply, until
 
 Start = Callable[..., Studio]
-PATIENCE_S = 30
-
-
-@contextmanager
-def page(url: str, topics: str) -> Iterator[ClientConnection]:
-    address = url.removeprefix("http://").rstrip("/")
-    with connect(f"ws://{address}/live?topics={topics}", origin=Origin(f"http://{address}"), proxy=None) as live:
-        yield live
-
-
-def until(live: ClientConnection, fits: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return the first message that fits."""
-    while not fits(told := json.loads(live.recv(timeout=PATIENCE_S))):
-        pass
-    return dict(told)
 
 
 def refusal(opened: Studio, **asked: object) -> str:
     """Return why a request is refused."""
-    with page(opened.server.url, "none") as live:
-        live.send(json.dumps(asked))
-        return str(until(live, lambda told: told["topic"] == "refused")["why"])
+    return str(reply(opened, asked)["why"])
 
 
 def test_a_build_that_is_half_written_hides_nothing_else(

@@ -3,13 +3,10 @@
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from thenar.drivers.calibration import FLAT, POSES
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
@@ -21,16 +18,10 @@ from thenar.runtime.taxels import load_taxel_calibration
 from thenar.studio.studio import Studio
 
 from ..browser import Browser
+from .sockets import PATIENCE_S, page, reply
 
 Start = Callable[..., Studio]
-PATIENCE_S = 30
 SWITCHES = ("s1", "s2", "s3", "s4")
-
-
-@pytest.fixture
-def line() -> Iterator[LineServer]:
-    with LineServer() as line:
-        yield line
 
 
 @pytest.fixture
@@ -251,12 +242,7 @@ def test_it_can_be_used_by_everybody(
 def test_what_no_page_sends_is_refused(studio: Start, folder: Path, asked: dict[str, object], why: str) -> None:
     harness_in(folder, f"{folder}/none")
     opened = studio(None)
-    parts = urlsplit(opened.server.url)
-    with connect(f"ws://{parts.netloc}/live?topics=none", origin=Origin(f"http://{parts.netloc}"), proxy=None) as live:
-        live.send(json.dumps(asked))
-        told = json.loads(live.recv(timeout=PATIENCE_S))
-    assert told["topic"] == "refused"
-    assert why in told["why"]
+    assert why in reply(opened, asked)["why"]
     assert [path.name for path in folder.iterdir()] == ["glove.toml"]
     assert opened.station.doing == ""
 
@@ -266,8 +252,7 @@ def test_a_recording_is_not_ended_by_watching(
 ) -> None:
     harness_in(folder, line.port)
     opened = studio(None)
-    parts = urlsplit(opened.server.url)
-    with connect(f"ws://{parts.netloc}/live?topics=none", origin=Origin(f"http://{parts.netloc}"), proxy=None) as live:
+    with page(opened.server.url) as live:
         live.send(json.dumps({"do": "record", "name": "A", "id": "kamakura14", "value": 1}))
         live.send(json.dumps({"do": "watch"}))
         told = json.loads(live.recv(timeout=PATIENCE_S))

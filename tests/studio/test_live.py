@@ -5,14 +5,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from shutil import copytree
 from typing import Any
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.select import Select
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
@@ -28,10 +25,10 @@ from thenar.studio.studio import Studio
 
 from ..browser import Browser
 from ..sets import single_settings
+from .sockets import PATIENCE_S, page
 
 pytestmark = pytest.mark.slow
 Start = Callable[..., Studio]
-PATIENCE_S = 30
 # Their sensors; the glove has no joints.
 BUILDS = {"few": (0, 1, 2), "more": (1, 2, 3, 4), "bent": (0, 8)}
 
@@ -246,15 +243,13 @@ def test_without_builds_and_a_run_nothing_empty_is_shown(browser: Browser, studi
 
 def test_a_page_names_members_by_id_alone_and_its_requests_are_bounded(studio: Start, project: Path) -> None:
     opened = studio()
-    place = urlsplit(opened.server.url).netloc
     ids = {member.name: member.id for kind in ("recording", "build") for member in opened.project.members(kind)}
     recording, few, more = ids["rec.mcap"], ids["few"], ids["more"]
-    how: dict[str, Any] = {"origin": Origin(f"http://{place}"), "proxy": None, "compression": None}
-    with connect(f"ws://{place}/live?topics=none", **how) as page:
+    with page(opened.server.url) as live:
 
         def reply(**asked: object) -> dict[str, Any]:
-            page.send(json.dumps(asked))
-            found: dict[str, Any] = json.loads(page.recv(timeout=PATIENCE_S))
+            live.send(json.dumps(asked))
+            found: dict[str, Any] = json.loads(live.recv(timeout=PATIENCE_S))
             return found
 
         for member in ("../recorded/rec.mcap", "rec.mcap", "/etc/passwd", "", "x" * 1000, few):
@@ -274,7 +269,7 @@ def test_a_page_names_members_by_id_alone_and_its_requests_are_bounded(studio: S
             assert reply(**asked, numbers=wrong)["why"].startswith("the page sent an invalid message")
         assert reply(do="use-build", id="../few")["why"].startswith("the project has no build ")
         assert reply(do="moments", ids=[recording, few], numbers=[0, 2**62 - 1, -1])["topic"] == "moments"
-    with connect(f"ws://{place}/live?topics=none", **how) as page:
+    with page(opened.server.url) as live:
         # However many recordings pages ask for, a few stay open.
         for name in range(6):
             (project / f"rec{name}.mcap").write_bytes((project / "rec.mcap").read_bytes())

@@ -11,8 +11,6 @@ import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.taxonomy import published
@@ -23,9 +21,9 @@ from thenar.studio.studio import Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of
+from .sockets import reply
 
 Start = Callable[..., Studio]
-PATIENCE_S = 30
 SWITCHES = ("s1", "s2", "s3")
 OBJECTS = 'PoS = ["bottle"]\nTip = ["pin"]\nLat = ["key"]\n'
 # What is held in each grasp.
@@ -34,12 +32,6 @@ HELD: dict[str, dict[str, float]] = {
     "Tip": {"s1": 1, "s2": 0, "s3": 0},
     "Lateral": {"s1": 0, "s2": 1, "s3": 0},
 }
-
-
-@pytest.fixture
-def line() -> Iterator[LineServer]:
-    with LineServer() as line:
-        yield line
 
 
 @pytest.fixture
@@ -266,12 +258,8 @@ def test_it_can_be_used_by_everybody(
 )
 def test_what_no_page_sends_is_refused(studio: Start, folder: Path, asked: dict[str, object], why: str) -> None:
     opened = studio(None)
-    parts, before = urlsplit(opened.server.url), {*folder.iterdir()}
-    with connect(f"ws://{parts.netloc}/live?topics=none", origin=Origin(f"http://{parts.netloc}"), proxy=None) as live:
-        live.send(json.dumps(asked))
-        told = json.loads(live.recv(timeout=PATIENCE_S))
-    assert told["topic"] == "refused"
-    assert why in told["why"]
+    before = {*folder.iterdir()}
+    assert why in reply(opened, asked)["why"]
     assert {*folder.iterdir()} == before
     assert opened.station.doing == ""
 

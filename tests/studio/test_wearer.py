@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 from thenar.cli import run
 from thenar.compiler import adapt, compile_build
@@ -26,10 +24,10 @@ from thenar.studio.studio import Studio
 
 from ..browser import Browser
 from ..sets import grasp_set_of
+from .sockets import reply
 from .test_compare import rows
 
 Start = Callable[..., Studio]
-PATIENCE_S = 30
 
 
 @pytest.fixture
@@ -53,17 +51,6 @@ def adapted(browser: Browser) -> None:
     browser.driver.find_element(By.ID, "adapt").send_keys(Keys.ENTER)
     browser.wait(lambda: browser.text("result-heading"))
     browser.wait(lambda: "adapted from" in browser.text("use"))
-
-
-def told(opened: Studio, request: dict[str, Any], topic: str) -> dict[str, Any]:
-    """Return the first message of a topic after a request, or its refusal."""
-    address = opened.server.url.removeprefix("http://").rstrip("/")
-    with connect(f"ws://{address}/live?topics={topic}", origin=Origin(f"http://{address}"), proxy=None) as live:
-        live.send(json.dumps(request))
-        while True:
-            found = json.loads(live.recv(timeout=PATIENCE_S))
-            if found["topic"] == "refused" or (found["topic"] == topic and (topic != "work" or "why" in found)):
-                return dict(found)
 
 
 def test_a_build_is_adapted_to_its_wearer_and_back(
@@ -210,7 +197,7 @@ def test_what_a_page_may_not_ask_for_is_refused(
     known = {one.name: one.id for kind in ("set", "build") for one in opened.project.members(kind)}
     if "ids" in request_:
         request_ = request_ | {"ids": [known.get(one, one) for one in request_["ids"]]}
-    refused = told(opened, request_, "refused")
+    refused = reply(opened, request_)
     assert said in refused["why"]
     assert sorted(folder.iterdir()) == before
 
@@ -218,7 +205,7 @@ def test_what_a_page_may_not_ask_for_is_refused(
 def test_another_persons_trials_are_not_adapted_to(studio: Start, folder: Path) -> None:
     opened = studio(None)
     others = next(one.id for one in opened.project.members("set") if one.name == "D.grasps")
-    assert "is no recording of C" in told(opened, {"do": "adapt", "ids": [others]}, "work")["why"]
+    assert "is no recording of C" in reply(opened, {"do": "adapt", "ids": [others]}, "work", "why")["why"]
     assert opened.project.state.build == "more"
 
 
@@ -313,5 +300,5 @@ def test_a_new_type_is_recorded_and_taught(browser: Browser, studio: Start, worn
 
 
 def test_a_type_that_the_build_knows_is_no_new_one(studio: Start, worn: Path) -> None:
-    assert "cup" in told(studio(None), {"do": "wear", "name": "cup"}, "refused")["why"]
+    assert "cup" in reply(studio(None), {"do": "wear", "name": "cup"})["why"]
     assert not list(worn.glob("*.mcap"))

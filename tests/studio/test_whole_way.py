@@ -28,12 +28,6 @@ HELD: dict[str, dict[str, float]] = {
 
 
 @pytest.fixture
-def line() -> Iterator[LineServer]:
-    with LineServer() as line:
-        yield line
-
-
-@pytest.fixture
 def board(line: LineServer) -> Iterator[BoardSender]:
     with BoardSender(line.send, SWITCHES, ("flex",), 100) as board:
         yield board
