@@ -65,6 +65,9 @@ def test_the_difference_is_that_of_the_majorities_of_trials_that_neither_was_tra
     assert [(each["a"], each["b"]) for each in found["changed"]] == [
         (one[t], other[t]) for t in truth if one[t] != other[t]
     ]
+    subjects = dict(zip(new.trial_ids.tolist(), (new.subjects == "bo").astype(np.intp), strict=True))
+    ends = paired_interval(right[1].astype(np.intp) - right[0], np.array([*subjects.values()]))
+    assert (found["low"], found["high"]) == pytest.approx(ends)
     assert found["low"] < found["difference"] < found["high"]
     for kind in found["types"]:
         those = np.array([name == kind["grasp"] for name in truth.values()])

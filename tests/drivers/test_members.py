@@ -99,6 +99,15 @@ def test_an_invalid_foreign_member_is_refused_in_a_sentence(
         list(registry)
 
 
+def test_a_foreign_class_derives_from_the_base_of_its_registry(site: Path) -> None:
+    write_package(site / "package_of_classes", own="MEMBER = type('Own', (Sort,), {'name': 'own'})")
+    (site / "other_classes.py").write_text("class Stranger: ...\n")
+    registry = Members("sort", type, "package_of_classes", "thenar.sorts", base=Sort)
+    write_distribution(site, "somebody", b="other_classes:Stranger")
+    with pytest.raises(SettingError, match=r"is not a class derived from Sort: docs/how-to/extend\.md"):
+        list(registry)
+
+
 @pytest.fixture
 def by_name(site: Path, request: pytest.FixtureRequest) -> MembersByName[Sort]:
     """Return the registry of a package that defines the sorts "sort.grip" and "sort.object_pose"."""
