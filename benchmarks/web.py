@@ -7,9 +7,9 @@ both. Each case is a line: CPU of the run's thread per frame, and its increase o
 us); wall time from a frame to its grasp; the load of the server's thread on a core; the frames per second that the
 readers received. Readers are WebSockets in a separate process, on the same cores.
 
-A second table is of the page in Chromium, if it is there, for a glove of 100 frames per second: the time from a frame
-until the page has drawn it (95 % within 60 ms), updates per second, the load of the page's process on a core (at most
-15 %), messages and bytes per second, and the heap when it began and at the end.
+A second table is of the page in Chromium, if it is there, for a glove of 100 frames per second. It has the time from a
+frame until the page has drawn it (95 % within 60 ms), and updates per second. It has the load of the page's process on
+a core (at most 15 %), messages and bytes per second, and the heap when it began and at the end.
 """
 
 import argparse

@@ -165,8 +165,10 @@ def _await(sources: Sources, read: Callable[[], Any], what: str) -> None:
 def _rows(
     port: str, baud: int, note: Callable[[str], None]
 ) -> Iterator[tuple[tuple[str, ...], int, Callable[[], bytes | None]]]:
-    """Yield the names of the joints of a CyberGlove, or of the stream of a glove.toml, the age from which a row of
-    their bytes is old, and a function that waits for the next row; None: none came yet.
+    """Yield the names of the joints of a CyberGlove, or of the stream of a glove.toml.
+
+    With them come the age from which a row of their bytes is old, and a function that waits for the next row. It
+    returns None if none came yet.
     """
     names = tuple[str, ...]()
     if port.endswith(".toml"):

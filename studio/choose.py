@@ -1,7 +1,7 @@
 """The page *Choose*: click sensors on and off, and see what they recognise.
 
-Every browser has its own choice, so a page sends it whole and gets its own reply. What takes longer, a measurement
-with nested folds or the curve of what sensors are worth, is queued, and its result is sent to all pages.
+Every browser has its own choice, so a page sends it whole and gets its own reply. A measurement with
+nested folds and the curve of what sensors are worth take longer. They are queued, and sent to all pages.
 """
 
 import hashlib
@@ -201,7 +201,7 @@ def _levels(grasp_set: GraspSet) -> dict[str, str]:
 
 
 def _content(study: SensorStudy, names: Sequence[str]) -> dict[str, object]:
-    """Return what pages show of a study, whose sensors have numbers in the order of `names`."""
+    """Return the fields of a study that pages show: sensors are numbered in the order of `names`."""
     numbers = {name: number for number, name in enumerate(names)}
     return {
         "of": study.of,

@@ -41,8 +41,12 @@ class Member(msgspec.Struct, frozen=True):
 
 
 class State(msgspec.Struct, forbid_unknown_fields=True):
-    """What is remembered in studio.json: the name of the build in use, of the one that it was adapted in place of, of
-    the wearer, and of the sets left aside; and the seconds that each kind of work last took.
+    """What is remembered in studio.json.
+
+    build, former  the names of the build in use, and of the one before it was adapted
+    wearer         the name of the person
+    aside          the names of the sets that are left aside
+    took           the seconds that each kind of work last took
     """
 
     build: str = ""
@@ -116,8 +120,9 @@ class Project:
         return self.recordings()[0]
 
     def recordings(self, paths: Sequence[Path] = ()) -> tuple[GraspSet, list[TrialId], list[str]]:
-        """Return the recordings, these sets or all in use, for each of their rows the trial as it was recorded, and a
-        sentence on each set that does not fit and on each edit that is not used.
+        """Return these sets, or all in use, as one; and for each of its rows the trial as it was recorded.
+
+        The third value has a sentence on each set that does not fit, and on each edit that is not used.
 
         Raises ThenarError if there is no set, or the log of edits is damaged before its last line.
         """

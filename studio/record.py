@@ -191,8 +191,10 @@ class RecordPage:
             self._studio.changed()
 
     def _write(self, doing: str, recording: Path, collection: Collection, done: int) -> None:
-        """Write the set of the accepted trials. What was recorded for a build has its codes, on whichever page it was
-        continued, and adapts it once it is complete, if it is the wearer's.
+        """Write the set of the accepted trials.
+
+        What was recorded for a build has its codes, on whichever page it was continued. Once it is complete, it adapts
+        the build, if it is the wearer's.
         """
         build = self._project.build_of(collection.build)
         codings = None if build is None else build[1].manifest.codings

@@ -110,8 +110,9 @@ def sensors_read(manifest: Manifest) -> dict[str, None]:
 
 
 def scan_time_us(elements: Sequence[str], project: Project | None = None) -> float | None:
-    """Return the time on the wire of a scan of switches and pads, on the harness of a project, or on the chips that are
-    proposed if it has none; None if that does not read them.
+    """Return the time on the wire of a scan of switches and pads; None if the harness does not read them.
+
+    The harness is that of the project; without one, it is the chips that are proposed.
     """
     try:
         harness = project.wiring() if project is not None and project.harness.exists() else propose_harness(elements)

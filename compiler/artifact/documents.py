@@ -210,8 +210,10 @@ def stated_report(
     firmware: str = "",
     confusion: NDArray[np.intp] | None = None,
 ) -> bytes:
-    """Return the page of a build, of what it states itself, of rows of its inputs (n, s) and (n, j) with labels (n,),
-    and of what else is known of it, as in a BuildReport.
+    """Return the page of a build, made of what the build states itself.
+
+    Rows of its inputs (n, s) and (n, j) with labels (n,) can be tried. `firmware` and `confusion` are as in a
+    BuildReport.
     """
     from ..report.content import ReportContent
     from ..report.page import report_html

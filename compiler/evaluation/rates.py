@@ -268,8 +268,8 @@ def paired_interval(gained: Rows, clusters: Rows) -> tuple[float, float]:
     clusters  (n,) number of the group of each unit, 0 to C - 1, such as its subject; of no influence if there is one
 
     Half a unit is added to each of the four counts of right and wrong (A. Agresti and Y. Min 2005, Statistics in
-    Medicine 24: 729). Units of a group are correlated: the variance is multiplied by its cluster-robust estimate over
-    the plain one, at least 1, and Student's t with C - 1 degrees of freedom replaces the normal quantile.
+    Medicine 24: 729). Units of a group are correlated. So the variance is multiplied by its cluster-robust estimate
+    over the plain one, at least 1. Student's t with C - 1 degrees of freedom replaces the normal quantile.
     """
     n, total, unequal = len(gained), int(gained.sum()), int(np.count_nonzero(gained))
     sizes, sums = np.bincount(clusters).tolist(), np.bincount(clusters, gained).astype(np.intp).tolist()

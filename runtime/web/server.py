@@ -125,9 +125,10 @@ class Server(Closing):
         self._started.wait()
 
     def publish(self, topic: str, message: Message) -> None:
-        """Make this the newest message of its topic: its text, or a function that makes it on the server's thread, for
-        the pages that are open and for each one that is opened later. Never blocks. A message not sent before the next
-        of its topic is dropped.
+        """Make this the newest message of its topic: its text, or a function that makes it on the server's thread.
+
+        It is sent to the pages that are open, and to each one that is opened later. Never blocks. A message not sent
+        before the next of its topic is dropped.
         """
         self._latest[topic] = message
 
