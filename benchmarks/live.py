@@ -14,11 +14,12 @@ import argparse
 import os
 import platform
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,26 +31,31 @@ from liveplay import (
     board,
     glove,
     joints_alone,
+    performed,
     played,
     read_along,
     restless,
+    run_arguments,
     wired,
     with_glove,
 )
 from liverates import Found, of_board, of_bus, of_glove
-from liverows import COLUMNS, row_us
 from liveway import way
 from rich.console import Console
 from rich.table import Table
 
 from thenar.runtime import Glove
-from thenar.runtime.frames import now_us
-from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.frames import SwitchFrame, now_us
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.live.sources import FrameBuffer
 from thenar.runtime.live.system import LiveSystem
-from thenar.simulator.playing.bench import Bench
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sources.base import SOURCES, Source
 
 MOST_US, REST_US, ROW_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 60, 25, 200, 0.9, 45, 20
 FRAMES, TURNS = 500, 8
+# Of rows by UDP.
+COLUMNS, ROWS, PORT = 30, 2000, 45_671
 # A clock so slow that the overhead of the emulation does not matter.
 SLOW_HZ = 10_000
 STAGES = ("the step alone", "and JSON lines, preshape, angles, health", "and MCAP", "and reports", "and a socket")
@@ -123,6 +129,56 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
     return lambda: next(run), feed
 
 
+def row_us(scene: Played, folder: Path) -> tuple[float, float]:
+    """Return microseconds of CPU a row of COLUMNS columns by UDP, medians: until its frames are there for the live
+    loop, and from there to a published grasp, which goes to a file as JSON lines.
+
+    Its columns are a clock, the build's joints and switches, and further switches. In every row half of the switches
+    change, and all joints.
+    """
+    joints = [joint.name for joint in scene.build.manifest.joints]
+    spare = COLUMNS - 1 - len(scene.kept) - len(joints)
+    switches = [*scene.kept, *(f"spare_{number}" for number in range(spare))]
+    ranges = ", ".join(f"{name} = [0, 1023]" for name in joints)
+    harness = parse_harness(
+        f'[[stream]]\nport = "udp://127.0.0.1:{PORT}"\nrate_hz = 200\ntime = "ms"\n'
+        f"columns = {['ms', *switches, *joints]!r}\nswitches = {switches!r}\njoints = {{ {ranges} }}\n",
+        "rows",
+    )
+    scan = whole_scan(harness, scene.kept)
+    (source,) = (source for kind in SOURCES.values() for source in kind.sources(harness, scene.kept, scan))
+    buffer = FrameBuffer(len(scene.kept), [source.owned])
+    draw = np.random.default_rng(1)
+    rows = np.hstack([draw.integers(0, 2, (ROWS, len(switches))), draw.integers(0, 1024, (ROWS, len(joints)))])
+    with (
+        Glove(scene.build, harness, sinks=[f"jsonl:{folder}/rows.jsonl"], feed=buffer.take) as glove,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line,
+        closing(source),
+    ):
+        source.open()
+        found = []
+        for number, row in enumerate(rows.tolist()):
+            line.sendto(f"{5 * number},{','.join(map(str, row))}\n".encode(), ("127.0.0.1", PORT))
+            began_s = time.thread_time()
+            _put(source, buffer)
+            there_s = time.thread_time()
+            next(glove)
+            found.append((there_s - began_s, time.thread_time() - there_s))
+    way, loop = 1e6 * np.median(found, axis=0)
+    return float(way), float(loop)
+
+
+def _put(source: Source, buffer: FrameBuffer) -> None:
+    """Read a row: its switches and its joints."""
+    for _ in range(2):
+        frame = source.read(1.0)
+        assert frame is not None
+        if isinstance(frame, SwitchFrame):
+            buffer.put_switches(0, frame, source.longest_us)
+        else:
+            buffer.put_glove(frame, source.longest_us)
+
+
 def rates(scene: Played, seconds: float, folder: Path) -> Table:
     """Return a line per wire: frames per second, with all sinks and the recording on."""
     made = table(
@@ -131,13 +187,13 @@ def rates(scene: Played, seconds: float, folder: Path) -> Table:
         "between system calls",
     )
     joints, own, whole = joints_alone("quick", folder), scene.kept, scene.performance.switch_names
-    found = [of_glove(scene, joints, sensors, seconds) for sensors in (18, 22)]
+    found = [of_glove(scene, folder, seconds, joints, sensors) for sensors in (18, 22)]
     for keys, baud, hz in ((len(own), 115_200, 0), (len(whole), 115_200, 0), (len(whole), 1_000_000, 1000)):
-        found.append(of_board(scene, keys, baud, hz, seconds))
-    found.append(of_board(scene, len(whole), 1_000_000, 0, seconds))
+        found.append(of_board(scene, folder, seconds, keys, baud, hz))
+    found.append(of_board(scene, folder, seconds, len(whole), 1_000_000, 0))
     for names, clock_hz in ((whole, 100_000), (own, 100_000), (own, SLOW_HZ)):
         what = f"I2C at {clock_hz // 1000} kHz, {len(own)} of {len(names)} switches"
-        found.append(of_bus(scene, what, wired(scene, names, clock_hz), seconds))
+        found.append(of_bus(scene, folder, seconds, what, wired(scene, names, clock_hz)))
     for each in found:
         made.add_row(*_rate(each))
     return made
@@ -152,14 +208,10 @@ def _rate(found: Found) -> tuple[str, ...]:
 
 def peak_mib(scene: Played, folder: Path, seconds: float) -> float:
     """Return the peak of a `thenar run` on a CyberGlove and a bus, with recording, socket and preshape."""
-    harness = wired(scene, scene.kept, 400_000)
-    with Bench(harness, scene.performance.switch_names, folder) as bench:
-        file = folder / "glove.toml"
-        file.write_text(harness_to_toml(with_glove(bench.harness, glove(scene, str(folder / "cyberglove")))))
-        options = ["--sink", "tcp:0", "--preshape", "barrett_bh8", "--record", folder / "peak.mcap"]
-        run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", file, "--status", *options]
-        run += ["--frames", str(int(400 * seconds))]
-        command = [sys.executable, "-c", PEAK, *map(str, run)]
+    with performed(scene, wired(scene, scene.kept, 400_000), folder) as bench:
+        options = ("--sink", "tcp:0", "--record", str(folder / "peak.mcap"), "--status")
+        run = run_arguments(scene.folder, bench.harness, folder, *options, "--frames", str(int(400 * seconds)))
+        command = [sys.executable, "-c", PEAK, sys.executable, "-m", "thenar.cli", *run]
         done = subprocess.run(command, env=os.environ | bench.environment, capture_output=True, text=True, check=True)
     return int(done.stdout) / 1024
 
@@ -183,7 +235,7 @@ def main() -> None:
             f"{ROW_US}), of which {loop_us:.0f} are the live thread's\n"
         )
         console.print(rates(scenes[0], options.seconds, folder), "")
-        passed = way(scenes[0])
+        passed = way(scenes[0], folder)
         calls = ", ".join(f"{calls:.0f} in {thread}" for thread, calls in sorted(passed.calls.items()))
         console.print(f"A frame passes {len(passed.files)} files (at most {MOST_FILES}); calls a grasp: {calls}")
         console.print("\n".join(passed.files), "")

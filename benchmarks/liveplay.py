@@ -1,12 +1,15 @@
-"""Inputs for the benchmarks of the live loop: scenes, their builds, gloves wired for them, and frames in memory."""
+"""Inputs for the benchmarks of the live loop: scenes, their builds, gloves wired for them, emulated devices that show
+a performance, and frames in memory.
+"""
 
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from itertools import cycle
 from pathlib import Path
+from threading import Event, Thread
 from typing import Literal
 
 import msgspec
@@ -19,8 +22,10 @@ from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.sources import FrameBuffer, Snapshot
 from thenar.simulator import load_scene, simulate
+from thenar.simulator.playing.bench import Bench
 from thenar.simulator.playing.performance import Performance, of_scene
 
 # Reads a socket as fast as lines come, so that they are sent and not lost.
@@ -29,6 +34,7 @@ SENSORS: Literal[18] = 18
 STATUS = ALWAYS | PLUGGED
 # How long a frame from memory counts as fresh: even a busy computer makes none of them old.
 _LONGEST_US = 1_000_000
+_CHANGE_S = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +50,6 @@ class Played:
     def kept(self) -> tuple[str, ...]:
         """The names of the kept switches, in the build's order."""
         return tuple(switch.name for switch in self.build.manifest.switches)
-
-    @cached_property
-    def keys(self) -> list[int]:
-        """The kept switches that are closed in each row, bit k for the kept switch k."""
-        columns = [self.performance.switch_names.index(name) for name in self.kept]
-        return [mask(row) for row in self.performance.switches[:, columns].tolist()]
 
 
 def played(name: str, folder: Path, prune: int = 0) -> Played:
@@ -69,15 +69,15 @@ def joints_alone(name: str, folder: Path) -> Path:
     ).folder
 
 
-def glove(played: Played, port: str = "glove", sensors: Literal[18, 22] = SENSORS) -> GloveWiring:
+def glove(played: Played, sensors: Literal[18, 22] = SENSORS) -> GloveWiring:
     """Return a CyberGlove that streams as fast as it can."""
-    return GloveWiring(port=port, sensors=sensors, calibration=str(played.calibration))
+    return GloveWiring(port="glove", sensors=sensors, calibration=str(played.calibration))
 
 
-def board(played: Played, port: str = "board", keys: int = 0, baud: int = 115_200) -> Harness:
+def board(played: Played, keys: int = 0, baud: int = 115_200) -> Harness:
     """Return a glove whose kept switches are the first of a board that prints at least `keys` of them."""
     names = [*played.kept, *(f"spare_{number}" for number in range(len(played.kept), keys))]
-    text = f'name = "board"\n[[stream]]\nport = "{port}"\nbaud = {baud}\nrate_hz = 100\nswitches = {names!r}\n'
+    text = f'name = "board"\n[[stream]]\nport = "board"\nbaud = {baud}\nrate_hz = 100\nswitches = {names!r}\n'
     return parse_harness(text + "[stream.board]\n", "board")
 
 
@@ -91,6 +91,46 @@ def wired(scene: Played, names: tuple[str, ...], clock_hz: int) -> Harness:
     proposed = propose_harness(names, device="/dev/i2c-7")
     bus = msgspec.structs.replace(proposed.buses[0], clock_hz=clock_hz, rate_hz=10_000.0)
     return with_glove(msgspec.structs.replace(proposed, buses=(bus,)), glove(scene))
+
+
+@contextmanager
+def repeated(seconds: float, do: Callable[[], object]) -> Iterator[None]:
+    """Repeat an action in a thread."""
+    stop = Event()
+
+    def run() -> None:
+        while not stop.wait(seconds):
+            do()
+
+    thread = Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+@contextmanager
+def performed(scene: Played, harness: Harness, folder: Path) -> Iterator[Bench]:
+    """Emulate all devices of a glove, and show row after row of the performance on them."""
+    rows = cycle(range(len(scene.performance)))
+    sensors = 0 if harness.cyberglove is None else harness.cyberglove.all_sensors
+
+    def step() -> None:
+        row = next(rows)
+        raw = scene.performance.sensors[row].tobytes()
+        bench.show(scene.performance.switches[row].tolist(), (raw + raw)[:sensors])
+
+    with Bench(harness, scene.performance.switch_names, folder) as bench, repeated(_CHANGE_S, step):
+        yield bench
+
+
+def run_arguments(build: Path, harness: Harness, folder: Path, *options: str) -> list[str]:
+    """Write the glove's file into `folder`, and return the arguments of a `thenar run` with preshapes."""
+    path = folder / "glove.toml"
+    path.write_text(harness_to_toml(harness))
+    return ["run", str(build), "--glove", str(path), "--preshape", "barrett_bh8", *options]
 
 
 class Memory:
@@ -114,12 +154,8 @@ def restless(switches: int, frames: int, seed: int) -> list[tuple[int, bytes]]:
     """Return frames that differ as much as chance allows: half of the switches, and all sensors, change."""
     rng = np.random.default_rng(seed)
     bits, sensors = rng.random((frames, switches)) < 0.5, rng.integers(1, 256, (frames, SENSORS), dtype=np.uint8)
-    return [(mask(row.tolist()), raw.tobytes()) for row, raw in zip(bits, sensors, strict=True)]
-
-
-def mask(closed: Sequence[bool]) -> int:
-    """Return the closed switches as one integer."""
-    return sum(1 << number for number, shut in enumerate(closed) if shut)
+    masks = [sum(1 << number for number, shut in enumerate(row) if shut) for row in bits.tolist()]
+    return [(closed, raw.tobytes()) for closed, raw in zip(masks, sensors, strict=True)]
 
 
 @contextmanager

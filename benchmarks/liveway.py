@@ -10,18 +10,12 @@ import threading
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import FrameType
 
 import msgspec
-from liveplay import Played, board, glove, with_glove
-from liverates import changing
+from liveplay import Played, board, glove, performed, run_arguments, with_glove
 
 from thenar.cli import run
-from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.lines import BoardSender
-from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.harness.writing import harness_to_toml
 
 # Runs of two lengths, whose difference is the path of a frame without start and end.
 SHORT, LONG = 200, 1200
@@ -39,9 +33,9 @@ class Way:
     calls: dict[str, float]
 
 
-def way(scene: Played) -> Way:
+def way(scene: Played, folder: Path) -> Way:
     """Return the path of a row of a board and a CyberGlove, to JSON lines and a preshape."""
-    before, after = _calls(scene, SHORT), _calls(scene, LONG)
+    before, after = _calls(scene, folder, SHORT), _calls(scene, folder, LONG)
     grasps = LONG - SHORT
     found = {key: (count - before.get(key, 0)) / grasps for key, count in after.items()}
     files = {key.split("|")[1] for key, each in found.items() if each * _EVERY >= 1}
@@ -50,24 +44,13 @@ def way(scene: Played) -> Way:
     return Way(tuple(sorted(files)), calls)
 
 
-def _calls(scene: Played, frames: int) -> Calls:
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        harness = with_glove(board(scene, f"{folder}/board"), glove(scene, f"{folder}/glove"))
-        (folder / "glove.toml").write_text(harness_to_toml(harness))
-        options = ("--sink", "jsonl:/dev/null", "--preshape", "barrett_bh8", "--frames", str(frames))
-        with (
-            PtyLine(folder / "board", 115_200) as line,
-            PtyLine(folder / "glove") as other,
-            BoardSender(line.send, scene.kept, (), harness.streams[0].rate_hz) as device,
-            EmulatedCyberGlove(other) as hand,
-            changing(scene, lambda closed, _: device.show(closed)),
-            changing(scene, lambda _, raw: hand.set(raw)),
-        ):
-            command = [sys.executable, __file__, str(folder / "calls"), "run", str(scene.folder)]
-            command += ["--glove", str(folder / "glove.toml"), *options]
-            subprocess.run(command, check=True, capture_output=True)
-        return msgspec.json.decode((folder / "calls").read_bytes(), type=Calls)
+def _calls(scene: Played, folder: Path, frames: int) -> Calls:
+    counts = folder / "calls"
+    with performed(scene, with_glove(board(scene), glove(scene)), folder) as bench:
+        options = ("--sink", "jsonl:/dev/null", "--frames", str(frames))
+        arguments = run_arguments(scene.folder, bench.harness, folder, *options)
+        subprocess.run([sys.executable, __file__, str(counts), *arguments], check=True, capture_output=True)
+    return msgspec.json.decode(counts.read_bytes(), type=Calls)
 
 
 def _profiled(path: Path, arguments: list[str]) -> None:

@@ -22,13 +22,10 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from liveplay import Played, board, glove, played, wired, with_glove
-from liverates import shown
+from liveplay import Played, board, glove, performed, played, run_arguments, wired, with_glove
 from msgspec.structs import replace
 
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.harness.writing import harness_to_toml
-from thenar.simulator.playing.bench import Bench
 
 MINUTE_S = 60.0
 MOST_FILE = 256 << 20
@@ -94,15 +91,6 @@ def glove_of_all(scene: Played) -> Harness:
     return replace(wired(scene, scene.kept[half:], 100_000), name="soak", streams=(stream,))
 
 
-def started(scene: Played, bench: Bench, folder: Path) -> "subprocess.Popen[bytes]":
-    """Start the run."""
-    (folder / "glove.toml").write_text(harness_to_toml(bench.harness))
-    sinks = ["--sink", "tcp:0", "--sink", "jsonl:/dev/null", "--preshape", "barrett_bh8", "--status"]
-    run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", folder / "glove.toml", *sinks]
-    limited = [sys.executable, "-c", LIMITED, MOST_FILE, *run, "--record", folder / "soak.mcap"]
-    return subprocess.Popen(list(map(str, limited)), env=os.environ | bench.environment)
-
-
 def sampled(pid: int, reader: Reader, seconds: float) -> Sample:
     """Return the state of the run after `seconds`."""
     before = _cpu_s(pid)
@@ -148,9 +136,11 @@ def soak(folder: Path, minutes: float) -> list[str]:
     scene = played("quick", folder)
     every_s = min(MINUTE_S, minutes * MINUTE_S / 6)
     with ExitStack() as stack:
-        bench = stack.enter_context(Bench(glove_of_all(scene), scene.performance.switch_names, folder))
-        stack.enter_context(shown(scene, bench))
-        run = stack.enter_context(started(scene, bench, folder))
+        bench = stack.enter_context(performed(scene, glove_of_all(scene), folder))
+        sinks = ("--sink", "tcp:0", "--sink", "jsonl:/dev/null", "--record", str(folder / "soak.mcap"), "--status")
+        arguments = run_arguments(scene.folder, bench.harness, folder, *sinks)
+        command = [sys.executable, "-c", LIMITED, str(MOST_FILE), sys.executable, "-m", "thenar.cli", *arguments]
+        run = stack.enter_context(subprocess.Popen(command, env=os.environ | bench.environment))
         stack.callback(run.terminate)
         reader, samples = Reader(folder / "socket"), list[Sample]()
         reader.lines(time.monotonic() + every_s / 10)
