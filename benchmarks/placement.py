@@ -1,4 +1,4 @@
-"""Fewer switches for the same accuracy: thenar's placements and baselines compared with the paper's pruned ID3.
+"""Fewer switches for the same accuracy: thenar's placements compared with the paper's pruned ID3.
 
     python benchmarks/placement.py SET.grasps ...
 
@@ -12,21 +12,97 @@ named -cost take these into account).
 
 import argparse
 import os
+from bisect import bisect_left
 from collections.abc import Sequence
 from pathlib import Path
-from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
-from placementlines import CONSOLE, MOST, SHOWN, WITHIN, Data, Line, Point, measured, papers
+from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
 from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.glove.propose import propose_harness
+from thenar.compiler.placement.methods.base import METHODS, PAPERS, Chooser
+from thenar.compiler.placement.ports import port_costs
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.samples import Samples
+from thenar.compiler.samples import Columns, Samples
+from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.workers import in_workers
+from thenar.runtime.model.tables import winners
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.scanning.timing import scan_us
 
 FOLDS, SEED = 4, 1
+MOST, WITHIN, ROUNDS = 40, 0.005, 100
+# Sizes tried before the bisection, without joints and with them: accuracy does not grow with every switch.
+TRIED = {False: (8, 16, 33, MOST), True: (8, 16, MOST)}
+CONSOLE = Console(width=150)
+
+
+class Point(NamedTuple):
+    """Means over the folds: accuracy, number of switches, scan time of a new glove and as wired."""
+
+    rate: float
+    size: float
+    new_us: float
+    wired_us: float
+
+
+class Placements:
+    """The placements of one method in all folds of a set, and their results."""
+
+    def __init__(self, samples: Samples, names: Sequence[str], method: str) -> None:
+        self._samples, self._names, self._method = samples, names, METHODS[method]
+        self._harness = propose_harness(names)
+        self._folds = weka_folds(samples.labels, FOLDS, SEED)
+        ports = port_costs(self._harness, names)
+        self._choosers = [self._method.chooser(samples.rows(np.sort(fold.train)), ports) for fold in self._folds]
+        self._known: dict[int, Point] = {}
+
+    def pruned(self, prune: int) -> Point:
+        """Return the result of ID3 with the paper's S."""
+        return self._mean([choose(prune) for choose in self._choosers])
+
+    def at(self, most: int) -> Point:
+        """Return the result with at most `most` switches; ID3's S is the smallest that leaves no more."""
+        if most not in self._known:
+            self._known[most] = self._mean([self._kept(choose, most) for choose in self._choosers])
+        return self._known[most]
+
+    def smallest(self, wanted: float) -> Point | None:
+        """Return the smallest placement found with at least this accuracy; None if none up to MOST has it."""
+        tried = TRIED[bool(self._samples.codes.size)]
+        enough = next((size for size in tried if self.at(size).rate >= wanted), None)
+        if enough is None:
+            return None
+        short = max(size for size in (0, *tried) if size < enough)
+        while enough - short > 1:
+            middle = (enough + short) // 2
+            if self.at(middle).rate >= wanted:
+                enough = middle
+            else:
+                short = middle
+        return self.at(enough)
+
+    def _kept(self, choose: Chooser, most: int) -> Columns:
+        if self._method.by_number:
+            return choose(most)
+        parameters = range(len(self._samples.labels) + 1)
+        return choose(bisect_left(parameters, True, key=lambda S: len(choose(S)) <= most))
+
+    def _mean(self, placements: Sequence[Columns]) -> Point:
+        found = []
+        for fold, columns in zip(self._folds, placements, strict=True):
+            X = np.hstack([self._samples.switches[:, sorted(columns)].astype(np.uint16), self._samples.codes])
+            labels = self._samples.labels
+            stumps, _ = boost(X[fold.train], labels[fold.train], self._samples.n_classes, rounds=ROUNDS)
+            rate = (winners(stumps.scores(X[fold.test])) == labels[fold.test]).mean()
+            names = [self._names[column] for column in columns]
+            gloves = (propose_harness(names), self._harness)
+            found.append((rate, len(columns), *(scan_us(whole_scan(one, names), one).us for one in gloves)))
+        return Point(*np.mean(found, axis=0).tolist())
 
 
 def papers_prune(grasp_set: GraspSet) -> int:
@@ -37,65 +113,45 @@ def papers_prune(grasp_set: GraspSet) -> int:
     return 62 if len(grasp_set) >= 62 * types else 13
 
 
-def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
-    """Return the table of smallest placements within half a point of the paper's accuracy."""
-    title = f"{kind(joints)}: fewest switches within {100 * WITHIN:g} points of the paper's"
-    times = ("scan, new glove, µs", "less", "as wired, µs", "less")
-    table = Table("method", "switches", "accuracy, %", "fewer switches", *times, title=title)
-    cells = (f"{paper.size:.1f}", f"{100 * paper.rate:.2f}", "", f"{paper.new_us:.0f}", "", f"{paper.wired_us:.0f}", "")
-    table.add_row("the paper's pruned ID3", *cells, end_section=True)
-    for line in lines:
-        if line.joints != joints or not METHODS[line.method].ours:
-            continue
-        point = line.smallest
-        if point is None:
-            table.add_row(line.method, f"none up to {MOST}", f"{100 * line.shown[-1].rate:.2f} at {SHOWN[joints][-1]}")
-            continue
-        fewer = f"{1 - point.size / paper.size:.0%}"
-        new = (f"{point.new_us:.0f}", f"{1 - point.new_us / paper.new_us:.0%}")
-        wired = (f"{point.wired_us:.0f}", f"{1 - point.wired_us / paper.wired_us:.0%}")
-        table.add_row(line.method, f"{point.size:.1f}", f"{100 * point.rate:.2f}", fewer, *new, *wired)
-    return table
+def measured(task: tuple[Samples, Sequence[str], str, float]) -> tuple[str, Point | None]:
+    """Return a method, and its smallest placement with the wanted accuracy."""
+    samples, names, method, wanted = task
+    return method, Placements(samples, names, method).smallest(wanted)
 
 
-def compared(lines: Sequence[Line], joints: bool) -> Table:
-    """Return the table of rates at given numbers of switches; numbers that a tree misses are added in brackets."""
-    heads = (f"{size} switches, %" for size in SHOWN[joints])
-    table = Table("method", *heads, "seconds to choose", title=kind(joints))
-    for line in lines:
-        if line.joints == joints:
-            cells = (cell(point, size) for point, size in zip(line.shown, SHOWN[joints], strict=True))
-            table.add_row(line.method, *cells, f"{line.seconds:.1f}")
-    return table
-
-
-def cell(point: Point, size: int) -> str:
-    """Return a rate, with the mean number of switches if it differs from `size`."""
-    return f"{100 * point.rate:.2f}" + ("" if point.size == size else f" ({point.size:.1f})")
-
-
-def kind(joints: bool) -> str:
-    """Return the inputs, in words."""
-    return "switches and joints" if joints else "switches only"
+def row(method: str, point: Point, paper: Point) -> tuple[str, ...]:
+    """Return the row of a placement: what it saves of the paper's."""
+    pairs = zip((point.new_us, point.wired_us), (paper.new_us, paper.wired_us), strict=True)
+    times = (cell for own, other in pairs for cell in (f"{own:.0f}", f"{1 - own / other:.0%}"))
+    return method, f"{point.size:.1f}", f"{100 * point.rate:.2f}", f"{1 - point.size / paper.size:.0%}", *times
 
 
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sets", nargs="+", type=Path)
-    options, jobs = parser.parse_args(), os.cpu_count() or 1
-    for path in options.sets:
-        began, grasp_set = perf_counter(), GraspSet.load(path)
-        samples = Samples.of(grasp_set, "switches"), Samples.of(grasp_set)
-        cut, prune = tuple(weka_folds(samples[0].labels, FOLDS, SEED)), papers_prune(grasp_set)
-        alone, both = (Data(part, grasp_set.switch_names, cut, prune) for part in samples)
-        CONSOLE.rule(f"{path.stem}: {len(grasp_set)} rows, {len(alone.names)} switches, S = {alone.prune}")
-        paper = dict(in_workers(papers, (both, alone), jobs))
-        lines = measured(alone, both, paper, jobs)
-        for joints in (False, True):
-            CONSOLE.print(saved(lines, joints, paper[joints]))
-            CONSOLE.print(compared(lines, joints))
-        CONSOLE.print(f"{perf_counter() - began:.0f} s, {jobs} processes")
+    ours = [name for name, method in METHODS.items() if method.ours]
+    for path in parser.parse_args().sets:
+        grasp_set = GraspSet.load(path)
+        names, prune = grasp_set.switch_names, papers_prune(grasp_set)
+        CONSOLE.rule(f"{path.stem}: {len(grasp_set)} rows, {len(names)} switches, S = {prune}")
+        for what, samples in (
+            ("switches only", Samples.of(grasp_set, "switches")),
+            ("switches and joints", Samples.of(grasp_set)),
+        ):
+            paper = Placements(samples, names, PAPERS).pruned(prune)
+            tasks = [(samples, names, method, paper.rate - WITHIN) for method in ours]
+            work = in_workers(measured, tasks, os.cpu_count() or 1)
+            lines = track(work, "methods", total=len(tasks), console=CONSOLE, transient=True)
+            table = Table(title=f"{what}: fewest switches within {100 * WITHIN:g} points of the paper's")
+            times = ("scan, new glove, µs", "less", "as wired, µs", "less")
+            for heading in ("method", "switches", "accuracy, %", "fewer switches", *times):
+                table.add_column(heading)
+            table.add_row(*row("the paper's pruned ID3", paper, paper), end_section=True)
+            for method, smallest in sorted(lines, key=lambda line: ours.index(line[0])):
+                cells = (method, f"none up to {MOST}") if smallest is None else row(method, smallest, paper)
+                table.add_row(*cells)
+            CONSOLE.print(table)
 
 
 if __name__ == "__main__":
