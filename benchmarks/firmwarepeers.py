@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Predictor, Rows
-from firmwarelogit import fitted, integer_logit
+from firmwarelogit import integer_logit
 from numpy.typing import NDArray
 
 FEATURES = SWITCHES + JOINTS
@@ -191,35 +191,6 @@ def _levels(X: Rows) -> Rows:
     return np.hstack([X[:, :SWITCHES] * 64, X[:, SWITCHES:]])
 
 
-def _m2cgen_logit(model: Any) -> dict[str, str]:
-    import m2cgen  # pyright: ignore[reportMissingImports]
-
-    logit, mean, deviation = model
-    raw = type(logit)()
-    raw.classes_, raw.n_features_in_ = logit.classes_, FEATURES
-    raw.coef_ = logit.coef_ / np.hstack([np.ones(SWITCHES), deviation])
-    raw.intercept_ = logit.intercept_ - raw.coef_[:, SWITCHES:] @ mean
-    return {
-        "peer.c": f"""#include <stdint.h>
-{m2cgen.export_to_c(raw)}
-{_filling("double")}
-int predict(void) {{
-    static double scores[{len(raw.classes_)}];
-    int best = 0;
-    fill();
-    score(features, scores);
-    for (uint8_t k = 1; k < {len(raw.classes_)}; k++) if (scores[k] > scores[best]) best = k;
-    return best;
-}}
-"""
-    }
-
-
-def _logit_answers(model: Any) -> Predictor:
-    logit, mean, deviation = model
-    return lambda X: logit.predict(np.hstack([X[:, :SWITCHES] > 0, (X[:, SWITCHES:] - mean) / deviation]))
-
-
 def peers() -> Iterator[Peer]:
     """Yield the peers."""
     for group, share in product(GROUPS, SHARES):
@@ -236,4 +207,3 @@ def peers() -> Iterator[Peer]:
     for neurons in HIDDEN:
         name, network = f"int8 network by hand, {neurons} hidden", partial(Network.trained, neurons=neurons)
         yield Peer(name, network, Network.files, lambda made: made, in_c=Network.files)
-    yield Peer("m2cgen, logistic regression", fitted, _m2cgen_logit, _logit_answers, ("m2cgen",))

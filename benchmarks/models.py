@@ -4,8 +4,8 @@
 
 Folds separate trials, or subjects; the switches (the first 33 of ID3, or all if there are fewer) are placed inside each
 fold, and settings are chosen inside as well. Predictions are kept in --store, so an interrupted run can be resumed.
-After a change of code or of a set, remove the store. A set may be a .grasps file. Real recordings are read from --data;
-missing peers and sets are named and left out. A full run takes hours, `--sets icub aml` takes minutes.
+After a change of code, remove the store. A set may be a .grasps file. Real recordings are read from --data; missing
+peers and sets are named and left out. A full run takes hours, `--sets icub aml` takes minutes.
 """
 
 import argparse
@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
 
-import msgspec
 import numpy as np
-from modelpeers import OURS, PEERS, Model, recognised
+from joblib import Memory
+from modelpeers import OURS, PEERS, Classes, Model, recognised
 from modelsets import SETS, Cut, cuts, load
 from numpy.typing import NDArray
 from rich.console import Console
@@ -31,73 +31,31 @@ from thenar.compiler.workers import in_workers
 from thenar.runtime.manifest import Of
 
 CONSOLE = Console(width=150)
-# The lead allowed to a baseline.
-WITHIN = 0.5
+MODELS = {model.name: model for model in OURS + PEERS}
 
 
-class Predicted(msgspec.Struct, frozen=True, rename={"predictions": "answers"}):  # codespell:ignore answers
-    """The predictions of a model for the rows of one fold, in order; `integers` are those of its deployed tables."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Predicted:
+    """The predictions of a model for the rows of one fold; `integers` are those of its deployed tables."""
 
-    set: str
-    of: Of
-    fold: str
-    model: str
     cpu_s: float
-    predictions: list[int]
-    integers: list[int] | None = None
-
-    @property
-    def key(self) -> tuple[str, str, str, str]:
-        """The key under which it is stored."""
-        return self.set, self.of, self.fold, self.model
+    predictions: Classes
+    integers: Classes | None
 
 
-Task = tuple[str, Cut, Model]
-Cuts = dict[str, list[Cut]]
-Store = dict[tuple[str, str, str, str], Predicted]
-
-
-def predicted(task: Task) -> Predicted:
-    """Return a model's predictions, with the processor time of this process and of its children."""
-    name, cut, model = task
+def predicted(task: tuple[Cut, str]) -> Predicted:
+    """Return the predictions of a named model, with the processor time of this process and of its children."""
+    cut, name = task
     warnings.filterwarnings("ignore")
     began = process_time() + _of_children()
     with threadpool_limits(1):
-        predictions, integers = model.predicted(cut)
-    spent = process_time() + _of_children() - began
-    whole = None if integers is None else integers.tolist()
-    return Predicted(name, cut.of, cut.name, model.name, round(spent, 3), predictions.tolist(), whole)
+        predictions, integers = MODELS[name].predicted(cut)
+    return Predicted(process_time() + _of_children() - began, predictions, integers)
 
 
 def _of_children() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
-
-
-def stored(path: Path) -> Store:
-    """Return the predictions stored earlier."""
-    lines = path.read_bytes().splitlines() if path.exists() else []
-    return {each.key: each for each in map(msgspec.json.Decoder(Predicted).decode, lines)}
-
-
-def fill(store: Store, path: Path, work: Cuts, models: Sequence[Model], jobs: int) -> None:
-    """Compute the predictions that are not in the store, and add them."""
-    tasks = [
-        (name, cut, model)
-        for model in models
-        for name, found in work.items()
-        for cut in found
-        if (name, cut.of, cut.name, model.name) not in store
-    ]
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with Progress(*columns, console=Console(stderr=True, width=110)) as bar, path.open("ab") as file:
-        line = bar.add_task("folds", total=len(tasks))
-        for each in in_workers(predicted, tasks, jobs):
-            file.write(msgspec.json.encode(each) + b"\n")
-            file.flush()
-            store[each.key] = each
-            bar.update(line, advance=1, description=f"{each.model}, {Path(each.set).stem}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,33 +69,22 @@ class Line:
     cpu_s: float
 
 
-def lines(name: str, found: Sequence[Cut], models: Sequence[Model], store: Store) -> list[Line]:
-    """Return a line for each model with predictions for all of these folds, the best first."""
-    made = []
-    for model in models:
-        stored_ones = [store.get((name, cut.of, cut.name, model.name)) for cut in found]
-        if all(stored_ones):
-            made.append(_line(model, found, [each for each in stored_ones if each is not None]))
-    return sorted(made, key=lambda line: -line.rate.mean)
-
-
-def _line(model: Model, found: Sequence[Cut], stored_ones: Sequence[Predicted]) -> Line:
+def line_of(model: Model, found: Sequence[Cut], replies: Sequence[Predicted]) -> Line:
+    """Return the line of a model's predictions for these folds."""
     labels, trials, subjects = (
         np.concatenate([getattr(cut.test, what) for cut in found]) for what in ("labels", "trials", "subjects")
     )
     of = found[0].of
 
-    def rate(predictions: Sequence[list[int]]) -> Rate:
+    def rate(predictions: Sequence[Classes]) -> Rate:
         groups = subjects if of == "new subject" else None
         return Rate.predicted(np.concatenate(predictions), labels, trials, of=of, groups=groups)
 
-    whole = [each.integers for each in stored_ones if each.integers is not None]
-    hits = [
-        recognised(np.array(each.predictions, np.intp), cut.test) for each, cut in zip(stored_ones, found, strict=True)
-    ]
-    integers = rate(whole) if len(whole) == len(stored_ones) else None
-    cpu_s = sum(each.cpu_s for each in stored_ones)
-    return Line(model, rate([each.predictions for each in stored_ones]), integers, np.concatenate(hits), cpu_s)
+    whole = [each.integers for each in replies if each.integers is not None]
+    hits = [recognised(each.predictions, cut.test) for each, cut in zip(replies, found, strict=True)]
+    integers = rate(whole) if whole else None
+    cpu_s = sum(each.cpu_s for each in replies)
+    return Line(model, rate([each.predictions for each in replies]), integers, np.concatenate(hits), cpu_s)
 
 
 def p_value(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
@@ -170,84 +117,47 @@ def _against(line: Line, baseline: Line) -> tuple[str, str]:
     return f"{100 * (baseline.rate.mean - line.rate.mean):+.2f}", f"{p_value(line.hits, baseline.hits):.2g}"
 
 
-def summary(every: dict[tuple[str, Of], list[Line]], name: str) -> Table:
-    """Return the lead of the best baseline over model `name` on each set, and the best additive baseline."""
-    table = Table(title=f"{name}: within {WITHIN} points of the best baseline, ahead of every additive one?")
-    for heading in (
-        "set",
-        "",
-        f"{name}, %",
-        "best baseline, %",
-        "",
-        "behind",
-        "best additive baseline, %",
-        "",
-        "ahead",
-    ):
-        table.add_column(heading, justify="right" if heading.endswith(("%", "behind", "ahead")) else "left")
-    for (which, of), made in every.items():
-        mine = next((line for line in made if line.model.name == name), None)
-        baselines = [line for line in made if not line.model.ours]
-        additive = [line for line in baselines if line.model.additive]
-        if mine is None or not additive:
-            continue
-        cells = [which, of, f"{100 * mine.rate.mean:.2f}"]
-        for baseline, sign in ((baselines[0], 1), (additive[0], -1)):
-            gap = 100 * sign * (baseline.rate.mean - mine.rate.mean)
-            met = gap <= WITHIN if sign > 0 else gap >= 0
-            cells += [f"{100 * baseline.rate.mean:.2f}", baseline.model.name, f"{gap:+.2f} {'yes' if met else 'NO'}"]
-        table.add_row(*cells)
-    return table
-
-
-def asked() -> argparse.Namespace:
-    """Return the command line options."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or .grasps files")
-    parser.add_argument("--models", nargs="+", help="of " + ", ".join(model.name for model in OURS + PEERS))
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the real recordings")
-    parser.add_argument("--store", type=Path, default=Path("build/models.jsonl"))
-    parser.add_argument("--jobs", type=int, default=1)
-    return parser.parse_args()
-
-
-def worked(options: argparse.Namespace) -> Cuts:
-    """Return the folds of each available set."""
-    work: Cuts = {}
-    for name in options.sets:
-        try:
-            work[name] = list(cuts(load(name, options.data)))
-        except FileNotFoundError as reason:
-            CONSOLE.print(f"left out: {name}: {reason}")
-    return work
-
-
-def wanted(options: argparse.Namespace) -> Iterator[Model]:
-    """Yield the requested models that are available."""
-    for model in OURS + PEERS:
-        if options.models is not None and model.name not in options.models:
-            continue
-        if model.there:
+def available(names: Sequence[str]) -> Iterator[Model]:
+    """Yield those of the named models whose requirements are installed."""
+    for model in MODELS.values():
+        if model.name in names and model.there:
             yield model
-        else:
+        elif model.name in names:
             CONSOLE.print(f"left out: {model.name}: no {model.needs}")
 
 
-def main() -> None:
-    """Compute the predictions, and print the tables."""
-    options = asked()
-    models, work = list(wanted(options)), worked(options)
-    store = stored(options.store)
-    fill(store, options.store, work, models, options.jobs)
-    every = {}
-    for name, found in work.items():
+def folds(names: Sequence[str], data: Path) -> Iterator[tuple[str, Of, list[Cut]]]:
+    """Yield each available set and kind of folds, with its folds."""
+    for name in names:
+        try:
+            found = list(cuts(load(name, data)))
+        except FileNotFoundError as reason:
+            CONSOLE.print(f"left out: {name}: {reason}")
+            continue
         for of in dict.fromkeys(cut.of for cut in found):
-            part = [cut for cut in found if cut.of == of]
-            every[name, of] = lines(name, part, models, store)
-            CONSOLE.print(shown(name, of, every[name, of]))
-    for model in models:
-        if model.ours:
-            CONSOLE.print(summary(every, model.name))
+            yield name, of, [cut for cut in found if cut.of == of]
+
+
+def main() -> None:
+    """Compute the predictions that are not in the store, and print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sets", nargs="+", default=SETS, help=f"of {', '.join(SETS)}, or .grasps files")
+    parser.add_argument("--models", nargs="+", default=list(MODELS), help="of " + ", ".join(MODELS))
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the real recordings")
+    parser.add_argument("--store", type=Path, default=Path("build/models"), help="folder of the predictions")
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args()
+    models, work = list(available(options.models)), list(folds(options.sets, options.data))
+    recalled = Memory(options.store, verbose=0).cache(predicted)
+    tasks = [(cut, model.name) for model in models for _, _, found in work for cut in found]
+    tasks = [task for task in tasks if not recalled.check_call_in_cache(task)]
+    columns = (TextColumn("folds"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True, width=110)) as bar:
+        for _ in bar.track(in_workers(recalled, tasks, options.jobs), total=len(tasks)):
+            pass
+    for name, of, found in work:
+        lines = [line_of(model, found, [recalled((cut, model.name)) for cut in found]) for model in models]
+        CONSOLE.print(shown(name, of, sorted(lines, key=lambda each: -each.rate.mean)))
 
 
 if __name__ == "__main__":
