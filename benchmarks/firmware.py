@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
 from firmwarepeers import peers
+from firmwarerun import AVR, QEMU, on_avr, on_core
 from msgspec import structs
 from numpy.typing import NDArray
 from rich.console import Console
@@ -34,8 +35,6 @@ from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.costs import fit_for
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.sensors import Sensors, sensors_of
-from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import collapse
@@ -45,41 +44,9 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
 
-AVR = TARGETS["avr328p"]
 CORES = ("cortex-m4", "cortex-m0plus")
-QEMU = Path(__file__).parents[1] / "tests" / "qemu"
 sys.path.append(str(QEMU))
 qemu = import_module("qemu")
-# Prints what a function of one instruction and then what each frame took.
-MAIN = """
-#include <stdbool.h>
-#include <stdint.h>
-#include "semihosting.h"
-#include "ticks.h"
-extern uint8_t input[BYTES];
-int predict(void);
-void thenar_fault(void) { for (;;) semihosting_exit(true); }
-__attribute__((naked)) static int nothing(void) { __asm volatile("bx lr"); }
-static uint32_t said[2];
-__attribute__((noinline, noclone)) static void run(int (*function)(void))
-{
-    const uint32_t before = ticks_left();
-    said[0] = (uint32_t)function();
-    said[1] = (before - ticks_left()) & TICKS_MOST;
-}
-int main(void)
-{
-    const uint32_t frames = semihosting_open("frames", 6, SEMIHOSTING_RB);
-    const uint32_t predictions = semihosting_open("predictions", 11, SEMIHOSTING_WB);
-    start_ticking();
-    run(nothing);
-    do {
-        (void)semihosting_write(predictions, said, sizeof said);
-    } while (semihosting_read(frames, input, sizeof input) && (run(predict), true));
-    semihosting_exit(false);
-    return 0;
-}
-"""
 # Begins on reset, before main().
 PASS = """
 #include "thenar_glove_codes.h"
@@ -215,14 +182,8 @@ def of_peer(name: str, files: Mapping[str, str], frames: Frames, expected: NDArr
         flash, ram = _linked(folder, program, AVR.part)
         if flash > AVR.flash or ram > AVR.ram:
             raise FirmwareError(f"{name} takes {flash} bytes of flash and {ram} of RAM: not on an {AVR.part}")
-        words = [line.split() for line in call(["avr-nm", "-P", "program.elf"], folder).decode().splitlines()]
-        at = {word[0]: f"0x{word[2]}" for word in words if len(word) > 2}
-        places = [at["predict"], at["_end"], f"{at['input']}:{frames.shape[1]}", f"{at['input']}:1"]
-        command = [str(harness("simavr_classify")), AVR.part, str(AVR.clock_hz), "program.elf", *places]
-        known = call(command, folder, frames.tobytes())
-    record = np.dtype([("echo", "u1"), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
-    found = np.frombuffer(known, record)
-    differing = int(np.count_nonzero(found["grasp"] != expected))
+        found = on_avr(folder, frames)
+    differing = int(np.count_nonzero(found["returned"] != expected))
     middle, most, stack = int(np.median(found["cycles"])), int(found["cycles"].max()), int(found["stack"].max())
     return Cost(middle, most, flash, ram, stack, differing, len(found))
 
@@ -257,12 +218,9 @@ def on_cores(files: Mapping[str, str], frames: Frames, expected: NDArray[np.inte
     """Return the most instructions of `predict` over `input` on emulated cores of 32 bits."""
     most = []
     for name in CORES:
-        core = qemu.CORES[name]
-        main = {"main.c": MAIN.replace("BYTES", str(frames.shape[1])), "ticks.h": (QEMU / "ticks.h").read_text()}
-        given = {**files, **main, "frames": frames.tobytes()}
-        found = np.frombuffer(core.emulate(given, flags=("-w",)), np.dtype([("grasp", "<u4"), ("ticks", "<u4")]))
-        assert (found["grasp"][1:] == expected).all()
-        most.append(int(core.instructions(found["ticks"][1:], int(found["ticks"][0])).max()))
+        predictions, instructions = on_core(qemu.CORES[name], files, frames)
+        assert (predictions == expected).all()
+        most.append(int(instructions.max()))
     return " / ".join(f"{each:,}" for each in most)
 
 

@@ -8,15 +8,16 @@ libsimavr, flash, RAM and stack. Every compiled result is compared with Python's
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from firmwarerun import AVR, on_avr, on_core, symbols
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.compiler.firmware.classifier import segment_files
-from thenar.compiler.firmware.targets.avr import harness
 from thenar.compiler.firmware.tools import (
     AVR_COMPILER,
     HOST_COMPILER,
@@ -36,94 +37,65 @@ _SANITIZE = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover
 Lanes = NDArray[np.int16]
 Flags = NDArray[np.bool_]
 
-_COMMON = """\
+# It starts when it is called first. `copy` is called alone to subtract its cycles.
+_PROGRAM = """\
 #include "thenar_hand_segments.h"
-struct record {{ int16_t lanes[{lanes}]; uint8_t best, refused; }};
-struct record record;
+struct {{ int16_t lanes[{lanes}]; uint8_t best, refused; }} input;
 int16_t scores[{lanes}];
 uint16_t memory[THENAR_HAND_SEGMENT_MEMORY];
 thenar_segmenter stream;
-uint8_t decide(void);
-uint8_t copy(void);
-__attribute__((noinline, noclone)) uint8_t copy(void)
+int copy(void);
+int predict(void);
+__attribute__((noinline, noclone)) int copy(void)
 {{
+    static bool begun = false;
+    if (!begun)
+        thenar_segment_start(&stream, &thenar_hand_segment_model, memory);
+    begun = true;
     for (uint8_t lane = 0u; lane < {lanes}u; lane++)
-        scores[lane] = record.lanes[lane];
-    return record.best;
+        scores[lane] = input.lanes[lane];
+    return input.best;
 }}
-__attribute__((noinline, noclone)) uint8_t decide(void)
+__attribute__((noinline, noclone)) int predict(void)
 {{
-    const uint8_t best = copy();
-    return thenar_segment_push(&stream, scores, best, record.refused != 0u);
+    const uint8_t best = (uint8_t)copy();
+    return thenar_segment_push(&stream, scores, best, input.refused != 0u);
 }}
 """
-_MAINS = {
-    "host": """\
+_HOST_MAIN = """
 #include <stdio.h>
 int main(void)
-{{
-    thenar_segment_start(&stream, &thenar_hand_segment_model, memory);
-    while (fread(&record, sizeof record, 1, stdin) == 1)
-        (void)putchar(decide());
+{
+    while (fread(&input, sizeof input, 1, stdin) == 1)
+        (void)putchar(predict());
     return fflush(stdout) != 0;
-}}
-""",
-    "avr": """\
-int main(void)
-{{
-    thenar_segment_start(&stream, &thenar_hand_segment_model, memory);
-    for (;;)
-        (void){function}();
-}}
-""",
-    "cortex-m": """\
-#include "semihosting.h"
-void thenar_fault(void);
-void thenar_fault(void)
-{{
-    for (;;)
-        semihosting_exit(true);
-}}
-int main(void)
-{{
-    const uint32_t given = semihosting_open("frames", 6, SEMIHOSTING_RB);
-    const uint32_t results = semihosting_open("predictions", 11, SEMIHOSTING_WB);
-    bool whole = true;
-    thenar_segment_start(&stream, &thenar_hand_segment_model, memory);
-    while (semihosting_read(given, &record, sizeof record)) {{
-        const uint8_t state = decide();
-        whole = semihosting_write(results, &state, 1) && whole;
-    }}
-    semihosting_exit(!whole);
-    return 0;
-}}
-""",
 }
+"""
+_AVR_MAIN = "int main(void) {{ for (;;) (void){}(); }}\n"
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """The results of a compiled decoder; on an AVR also cycles per tick, and bytes of flash, RAM and stack."""
+    """The results of a decoder on an AVR: states, cycles per tick, and bytes of flash, RAM and stack."""
 
     states: NDArray[np.uint8]
     cycles: NDArray[np.int64]
-    flash: int = 0
-    ram: int = 0
-    stack: int = 0
+    flash: int
+    ram: int
+    stack: int
 
 
-def records(lanes: Lanes, refused: Flags) -> bytes:
-    """Return the input of the programs for each tick: its scores, the number of the best, whether it is rejected."""
+def records(lanes: Lanes, refused: Flags) -> NDArray[np.uint8]:
+    """Return the inputs (n, bytes) of the programs: scores, the number of the best, whether it is rejected."""
     held = np.zeros(len(lanes), [("lanes", "<i2", lanes.shape[1:]), ("best", "u1"), ("refused", "u1")])
     held["lanes"], held["best"], held["refused"] = lanes, lanes.argmax(axis=1), refused
-    return held.tobytes()
+    return held.view(np.uint8).reshape(len(lanes), -1)
 
 
-def sources(model: SegmentModel, kind: str, function: str = "decide") -> dict[str, str]:
+def sources(model: SegmentModel, main: str = "") -> dict[str, str]:
     """Return path -> text of a program around the decoder."""
-    values = {"lanes": model.n_lanes, "function": function}
-    main = (_COMMON + _MAINS[kind]).format(**values)
-    return {**segment_files(_NAME, model), "thenar.h": file_text("core/thenar.h"), "main.c": main}
+    program = _PROGRAM.format(lanes=model.n_lanes) + main
+    return {**segment_files(_NAME, model), "thenar.h": file_text("core/thenar.h"), "program.c": program}
 
 
 def _compiled(files: Mapping[str, str]) -> list[str]:
@@ -134,45 +106,36 @@ def _lag(ticks: int) -> str:
     return f"-DTHENAR_HAND_LAG_TICKS={ticks}u"
 
 
-def run_host(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
-    """Run the decoder on this machine, with sanitizers."""
-    files = sources(model, "host")
+def run_host(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> NDArray[np.uint8]:
+    """Return the states of the decoder on this machine, with sanitizers."""
+    files = sources(model, _HOST_MAIN)
     with workshop(files) as folder:
         call([find(HOST_COMPILER), *STRICT, *_SANITIZE, _lag(lag), *_compiled(files), "-o", "program"], folder)
-        printed = call([str(folder / "program")], folder, records(lanes, refused))
-    return Run(np.frombuffer(printed, np.uint8), np.zeros(0, np.int64))
+        return np.frombuffer(call([str(folder / "program")], folder, records(lanes, refused).tobytes()), np.uint8)
 
 
 def run_avr(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> Run:
     """Run the decoder on an ATmega328P in libsimavr; its cycles are those of push() only."""
-    given, program = records(lanes, refused), harness("simavr_classify")
-    runs, size = [], len(given) // len(lanes)
-    for function in ("decide", "copy"):
-        files = sources(model, "avr", function)
+    runs = []
+    for function in ("predict", "copy"):
+        files = sources(model, _AVR_MAIN.format(function))
         with workshop(files) as folder:
-            command = [find(AVR_COMPILER), "-mmcu=atmega328p", "-Os", *STRICT, _lag(lag)]
+            command = [find(AVR_COMPILER), f"-mmcu={AVR.part}", "-Os", *STRICT, _lag(lag)]
             objects = compile_objects(command, _compiled(files), folder)
             call([*command, *objects, "-o", "program.elf"], folder)
-            lines = call(["avr-nm", "--format=posix", "program.elf"], folder).decode().splitlines()
-            words = {word[0]: word for word in map(str.split, lines)}
-            span = f"0x{words['record'][2]}:{size}"
-            places = [f"0x{words[symbol][2]}" for symbol in (function, "_end")]
-            printed = call([str(program), "atmega328p", "16000000", "program.elf", *places, span, span], folder, given)
-            sizes = call(["avr-size", *(path for path in objects if path != "main.c.o")], folder)
+            runs.append(on_avr(folder, records(lanes, refused), function))
+            sizes = call(["avr-size", *(path for path in objects if path != "program.c.o")], folder)
             flash = sum(int(line.split()[0]) + int(line.split()[1]) for line in sizes.decode().splitlines()[1:])
-            ram = sum(int(words[symbol][3], 16) for symbol in ("stream", "memory"))
-        shape = np.dtype([("record", "u1", size), ("state", "u1"), ("r25", "u1"), ("cycles", "<u4"), ("stack", "<u2")])
-        runs.append(np.frombuffer(printed, shape))
+            ram = sum(symbols(folder)[symbol][1] for symbol in ("stream", "memory"))
     timed, copied = runs
     cycles = timed["cycles"].astype(np.int64) - copied["cycles"]
-    return Run(timed["state"], cycles, flash, ram, int(timed["stack"].max()))
+    return Run(timed["returned"].astype(np.uint8), cycles, flash, ram, int(timed["stack"].max()))
 
 
-def run_cortex(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, emulate: Callable[..., bytes]) -> Run:
-    """Run the decoder on a core of tests/qemu."""
-    given: dict[str, str | bytes] = {**sources(model, "cortex-m"), "frames": records(lanes, refused)}
-    printed = emulate(given, flags=(*STRICT, _lag(lag)))
-    return Run(np.frombuffer(printed, np.uint8), np.zeros(0, np.int64))
+def run_core(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int, core: Any) -> NDArray[np.uint8]:
+    """Return the states of the decoder on a core of tests/qemu."""
+    states, _ = on_core(core, sources(model), records(lanes, refused), (*STRICT, _lag(lag)))
+    return states.astype(np.uint8)
 
 
 def python_states(model: SegmentModel, lanes: Lanes, refused: Flags, lag: int) -> NDArray[np.uint8]:

@@ -79,7 +79,7 @@ def test_on_this_machine_it_is_pythons_state_at_every_tick(runs: Any, seed: int)
     model, lag = _random_model(seed), (1, 5, 15, 40, 250)[seed % 5]
     lanes, refused = _lanes(runs, model, 800, seed)
     expected = runs.python_states(model, lanes, refused, lag)
-    np.testing.assert_array_equal(runs.run_host(model, lanes, refused, lag).states, expected)
+    np.testing.assert_array_equal(runs.run_host(model, lanes, refused, lag), expected)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_on_arms_cores_it_is_pythons_state_at_every_tick(runs: Any, cores: Any, 
     for model in (_random_model(5), runs.models()["each type its own"]):
         lanes, refused = _lanes(runs, model, 250, 1)
         expected = runs.python_states(model, lanes, refused, LAG)
-        np.testing.assert_array_equal(runs.run_cortex(model, lanes, refused, LAG, cores[core].emulate).states, expected)
+        np.testing.assert_array_equal(runs.run_core(model, lanes, refused, LAG, cores[core]), expected)
 
 
 def test_the_segment_decoder_takes_the_documented_avr_cycles_and_memory(runs: Any, avr: None) -> None:
