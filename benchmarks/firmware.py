@@ -14,13 +14,25 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
+from firmwaredata import (
+    CUTS,
+    JOINTS,
+    LINE,
+    PORTS,
+    SWITCHES,
+    Fold,
+    Predictor,
+    Settings,
+    folds,
+    rates,
+    raw,
+    split,
+    trained,
+)
 from firmwarepeers import peers
 from firmwarerun import AVR, QEMU, on_avr, on_core
 from msgspec import structs
@@ -29,7 +41,6 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.costs import fit_for
@@ -38,7 +49,6 @@ from thenar.compiler.firmware.sensors import Sensors, sensors_of
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import collapse
-from thenar.compiler.trainers.base import Model
 from thenar.runtime.code_line import CodeLine
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
@@ -78,7 +88,7 @@ class Ours:
 
     trainer: str
     bits: int
-    settings: tuple[tuple[str, Any], ...] = ()
+    settings: Settings = ()
     joints: bool = True
 
     @property
@@ -91,7 +101,7 @@ class Ours:
     def integers(self, fold: Fold) -> IntegerTables:
         """Return the integer tables of a fold."""
         samples = fold.samples(joints=self.joints)
-        tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
+        tables = collapse(trained(self.trainer, self.settings, fold, joints=self.joints), SWITCHES)
         return quantise(tables, samples.switches, samples.codes, 16, self.bits)
 
     def predictor(self, fold: Fold) -> Predictor:
@@ -101,8 +111,7 @@ class Ours:
 
 
 BINS = ("max_bins", 8)
-# The pull of a line is that of scikit-learn's logistic regression with C = 1, which the peers take.
-FEW, LINE = (("max_bins", 4),), (("penalty", 0.5),)
+FEW = (("max_bins", 4),)
 OURS = (
     Ours("logitboost", 16, (("rounds", 100), BINS)),
     Ours("logit", 16, (BINS,)),
@@ -111,12 +120,6 @@ OURS = (
     *(Ours("linear", 8, (*LINE, ("sparsity", sparsity))) for sparsity in (0.5, 0.6)),
     Ours("logit", 16, (BINS,), joints=False),
 )
-
-
-@cache
-def _trained(trainer: str, settings: tuple[tuple[str, Any], ...], fold: Fold, joints: bool) -> Model:
-    member = TRAINERS.named(trainer)
-    return member.train(fold.samples(joints=joints), member.candidates(dict(settings))[0] | dict(settings))
 
 
 @dataclass(frozen=True, slots=True)
