@@ -24,7 +24,7 @@ from thenar.runtime.recipe import AUTO
 
 SETS, TRIALS, DRAWS, MOST_TESTED = ("icub", "aml", "kamakura"), (3, 5, 8), 5, 700
 BEHIND = 1.0  # points
-SLOW = ("XGBoost", "LightGBM", "EBM", "EBM with pairs", "Weka LogitBoost")
+SLOW = ("EBM", "EBM with pairs", "Weka LogitBoost")
 
 
 def drawn(samples: Samples, trials: int) -> Iterator[Cut]:

@@ -116,19 +116,6 @@ def _fitted(make: Callable[..., Any], *, scaled: bool = False, **fixed: Any) -> 
     return predict
 
 
-def _xgboost(**given: Any) -> Any:
-    from xgboost import XGBClassifier  # pyright: ignore[reportMissingImports]
-
-    return XGBClassifier(n_estimators=200, tree_method="hist", subsample=0.8, colsample_bytree=0.5, n_jobs=1, **given)
-
-
-def _lightgbm(**given: Any) -> Any:
-    from lightgbm import LGBMClassifier  # pyright: ignore[reportMissingImports]
-
-    fixed = {"n_estimators": 200, "min_child_samples": 5, "subsample": 0.8, "subsample_freq": 1}
-    return LGBMClassifier(**fixed, colsample_bytree=0.5, n_jobs=1, verbose=-1, **given)
-
-
 def _ebm(**given: Any) -> Any:
     from interpret.glassbox import ExplainableBoostingClassifier  # pyright: ignore[reportMissingImports]
 
@@ -196,22 +183,6 @@ PEERS = (
         _fitted(HistGradientBoostingClassifier, max_iter=150, min_samples_leaf=5, random_state=SEED),
         _grid(max_leaf_nodes=[7, 31]),
         slow=True,
-    ),
-    Model(
-        "XGBoost",
-        "200 rounds, depth of 2",
-        _fitted(_xgboost, random_state=SEED),
-        _grid(max_depth=[3, 6]),
-        slow=True,
-        needs="xgboost",
-    ),
-    Model(
-        "LightGBM",
-        "200 rounds",
-        _fitted(_lightgbm, random_state=SEED),
-        _grid(num_leaves=[7, 31]),
-        slow=True,
-        needs="lightgbm",
     ),
     Model(
         "EBM",

@@ -12,7 +12,7 @@ import argparse
 import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
@@ -25,6 +25,7 @@ from rich.table import Table
 from sklearn.ensemble import RandomForestClassifier
 from sklearn.feature_selection import RFE
 from sklearn.linear_model import LogisticRegression
+from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from threadpoolctl import threadpool_limits
@@ -54,16 +55,8 @@ Chosen = dict[int, Columns]
 Method = Callable[[Samples, tuple[int, ...]], Chosen]
 
 
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """Rows to choose from and rows to test on."""
-
-    train: Samples
-    test: Samples
-
-
-def cuts(samples: Samples, by: str) -> Iterator[Cut]:
-    """Yield the folds by trial, or by groups of people."""
+def cuts(samples: Samples, by: str) -> Iterator[tuple[Samples, Samples]]:
+    """Yield the rows to choose from and those to test on, of the folds by trial, or by groups of people."""
     folds: list[Fold] = trial_folds(samples.labels, samples.trials, 4, SEED)
     if by == "subject":
         people = np.unique(samples.subjects)
@@ -74,7 +67,7 @@ def cuts(samples: Samples, by: str) -> Iterator[Cut]:
         train, test = (
             np.sort(random.permutation(rows)[:most]) for rows, most in ((fold.train, ROWS), (fold.test, TESTED))
         )
-        yield Cut(samples.rows(train), samples.rows(test))
+        yield samples.rows(train), samples.rows(test)
 
 
 def floating(samples: Samples, sizes: tuple[int, ...]) -> Chosen:
@@ -134,18 +127,15 @@ def values(samples: Samples) -> NDArray[np.float64]:
     return np.hstack([samples.switches, samples.taxels, samples.codes]).astype(np.float64)
 
 
-def accuracy(cut: Cut, sensors: Columns) -> float:
+def accuracy(train: Samples, test: Samples, sensors: Columns) -> float:
     """Return the share of test rows that a logistic regression of these sensors recognises."""
     columns = sorted(sensors)
-    X, T, y = values(cut.train)[:, columns], values(cut.test)[:, columns], cut.train.labels
     if not columns:
-        return float((cut.test.labels == cut.train.most_frequent).mean())
-    models = [make_pipeline(StandardScaler(), LogisticRegression(C=C, max_iter=300, tol=1e-3)) for C in CS]
-    inner = trial_folds(y, cut.train.trials, 3, SEED)
-    means = [
-        np.mean([model.fit(X[f.train], y[f.train]).score(X[f.test], y[f.test]) for f in inner]) for model in models
-    ]
-    return float(models[int(np.argmax(means))].fit(X, y).score(T, cut.test.labels))
+        return float((test.labels == train.most_frequent).mean())
+    inner = [(fold.train, fold.test) for fold in trial_folds(train.labels, train.trials, 3, SEED)]
+    model = make_pipeline(StandardScaler(), LogisticRegression(max_iter=300, tol=1e-3))
+    chosen = GridSearchCV(model, {"logisticregression__C": CS}, cv=inner).fit(values(train)[:, columns], train.labels)
+    return float(chosen.score(values(test)[:, columns], test.labels))
 
 
 # A set of CELLS, what folds leave out, and how many sensors are kept; and the accuracies of each method there, in %.
@@ -161,13 +151,13 @@ def measured(cell: str, by: Sequence[str], asked: argparse.Namespace, spent: dic
     hits: dict[str, dict[Key, list[float]]] = {method: {} for method in METHODS_COMPARED}
     several = len(np.unique(samples.subjects)) >= LEAST_PEOPLE
     folds = [(each, cut) for each in by if several or each == "trial" for cut in cuts(samples, each)]
-    for kind, cut in folds:
+    for kind, (train, test) in folds:
         for method, choose in METHODS_COMPARED.items():
             began = process_time()
-            chosen = choose(cut.train, sizes)
+            chosen = choose(train, sizes)
             spent[method] = max(spent[method], process_time() - began)
             for size in sizes:
-                hits[method].setdefault((cell, kind, size), []).append(accuracy(cut, chosen[size]))
+                hits[method].setdefault((cell, kind, size), []).append(accuracy(train, test, chosen[size]))
     return {method: {key: 100 * float(np.mean(each)) for key, each in found.items()} for method, found in hits.items()}
 
 

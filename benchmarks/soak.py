@@ -14,16 +14,16 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
 from liveplay import Played, board, glove, performed, played, run_arguments, wired, with_glove
 from msgspec.structs import replace
+from scipy.stats import theilslopes
 
 from thenar.runtime.harness.wiring import Harness
 
@@ -111,24 +111,21 @@ def _cpu_s(pid: int) -> float:
 def grown(samples: Sequence[Sample]) -> list[str]:
     """Return the quantities that grew, as sentences."""
     later = samples[min(WARM_UP, len(samples) - LEAST_SAMPLES) :]
+    # Over all samples, extrapolated from the median pair of them.
+    kib, us = (
+        theilslopes([getattr(sample, name) for sample in later]).slope * (len(later) - 1) for name in ("rss_kib", "us")
+    )
     found = []
-    if (kib := _growth(later, lambda sample: sample.rss_kib)) > MOST_KIB:
+    if kib > MOST_KIB:
         found.append(f"memory by {kib:.0f} KiB (at most {MOST_KIB})")
     if len({(sample.threads, sample.files) for sample in later}) > 1:
         found.append("threads or file descriptors came or went")
-    share = _growth(later, lambda sample: sample.us) / median(sample.us for sample in later)
+    share = us / median(sample.us for sample in later)
     if share > MOST_SHARE:
         found.append(f"the CPU a grasp by {share:.0%} (at most {MOST_SHARE:.0%})")
     if not all(sample.lines for sample in samples):
         found.append("for a while nothing was published")
     return found
-
-
-def _growth(samples: Sequence[Sample], of: Callable[[Sample], float]) -> float:
-    """Return the growth over all samples, extrapolated from the median pair of them."""
-    pairs = combinations(range(len(samples)), 2)
-    slope = median((of(samples[later]) - of(samples[first])) / (later - first) for first, later in pairs)
-    return slope * (len(samples) - 1)
 
 
 def soak(folder: Path, minutes: float) -> list[str]:
