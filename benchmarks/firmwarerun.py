@@ -66,7 +66,7 @@ def on_avr(folder: Path, frames: NDArray[np.uint8], function: str = "predict") -
 def on_core(
     core: Any, files: Mapping[str, str], frames: NDArray[np.uint8], flags: Sequence[str] = ("-w",)
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Return what `predict` returns for frames (n, F) on a core of tests/qemu, and the instructions that it takes."""
+    """Return the results of `predict` for frames (n, F) on a core of tests/qemu, and the instructions that it takes."""
     main = {"main.c": MAIN.replace("BYTES", str(frames.shape[1])), "ticks.h": (QEMU / "ticks.h").read_text()}
     written = core.emulate({**files, **main, "frames": frames.tobytes()}, flags=flags)
     found = np.frombuffer(written, np.dtype([("returned", "<u4"), ("ticks", "<u4")]))

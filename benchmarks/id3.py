@@ -20,6 +20,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
+
 N_BITS, N_CLASSES, N_BLOCK, MIN_SAMPLES, FLIP = 160, 14, 20_000, 200, 0.1
 ROWS = (1_000, 10_000, 100_000, 1_000_000)
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -38,8 +40,6 @@ class Measured(NamedTuple):
 
 def blocks(n: int) -> Any:
     """Yield (start, bits, labels) of the synthetic grasps, block by block, so that making them takes no memory."""
-    import numpy as np
-
     rng = np.random.default_rng(1)
     prototypes = rng.random((N_CLASSES, N_BITS)) < 0.3
     for start in range(0, n, N_BLOCK):
@@ -48,8 +48,6 @@ def blocks(n: int) -> Any:
 
 
 def filled(n: int, dtype: str) -> tuple[Any, Any]:
-    import numpy as np
-
     X, y = np.empty((n, N_BITS), dtype=dtype), np.empty(n, dtype=np.int64)
     for start, bits, labels in blocks(n):
         X[start : start + len(bits)] = bits
