@@ -37,16 +37,16 @@ _SANITIZE = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover
 Lanes = NDArray[np.int16]
 Flags = NDArray[np.bool_]
 
-# It starts when it is called first. `copy` is called alone to subtract its cycles.
+# It starts when it is called first, and returns the least byte of the result. `copy` is called alone to subtract its cycles.
 _PROGRAM = """\
 #include "thenar_hand_segments.h"
 struct {{ int16_t lanes[{lanes}]; uint8_t best, refused; }} input;
 int16_t scores[{lanes}];
 uint16_t memory[THENAR_HAND_SEGMENT_MEMORY];
 thenar_segmenter stream;
-int copy(void);
-int predict(void);
-__attribute__((noinline, noclone)) int copy(void)
+uint8_t copy(void);
+uint8_t predict(void);
+__attribute__((noinline, noclone)) uint8_t copy(void)
 {{
     static bool begun = false;
     if (!begun)
@@ -56,9 +56,9 @@ __attribute__((noinline, noclone)) int copy(void)
         scores[lane] = input.lanes[lane];
     return input.best;
 }}
-__attribute__((noinline, noclone)) int predict(void)
+__attribute__((noinline, noclone)) uint8_t predict(void)
 {{
-    const uint8_t best = (uint8_t)copy();
+    const uint8_t best = copy();
     return thenar_segment_push(&stream, scores, best, input.refused != 0u);
 }}
 """
