@@ -14,7 +14,6 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +33,7 @@ from firmwaredata import (
     trained,
 )
 from firmwarepeers import peers
-from firmwarerun import AVR, QEMU, on_avr, on_core
+from firmwarerun import AVR, CORES, on_avr, on_core
 from msgspec import structs
 from numpy.typing import NDArray
 from rich.console import Console
@@ -54,9 +53,7 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import quantise
 
-CORES = ("cortex-m4", "cortex-m0plus")
-sys.path.append(str(QEMU))
-qemu = import_module("qemu")
+ARM = ("cortex-m4", "cortex-m0plus")
 # Begins on reset, before main().
 PASS = """
 #include "thenar_glove_codes.h"
@@ -220,8 +217,8 @@ class Row:
 def on_cores(files: Mapping[str, str], frames: Frames, expected: NDArray[np.integer]) -> str:
     """Return the most instructions of `predict` over `input` on emulated cores of 32 bits."""
     most = []
-    for name in CORES:
-        predictions, instructions = on_core(qemu.CORES[name], files, frames)
+    for name in ARM:
+        predictions, instructions = on_core(CORES[name], files, frames)
         assert (predictions == expected).all()
         most.append(int(instructions.max()))
     return " / ".join(f"{each:,}" for each in most)
@@ -230,7 +227,7 @@ def on_cores(files: Mapping[str, str], frames: Frames, expected: NDArray[np.inte
 def ours_on_cores(layout: Layout, frames: Frames) -> str:
     """Return the most instructions of thenar's classifier on emulated cores of 32 bits."""
     files = Library("glove", numbered(layout.tables), layout).files
-    return " / ".join(f"{qemu.CORES[name].run(files, 'glove', layout, frames).most:,}" for name in CORES)
+    return " / ".join(f"{CORES[name].run(files, 'glove', layout, frames).most:,}" for name in ARM)
 
 
 def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Row:

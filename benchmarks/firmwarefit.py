@@ -8,16 +8,13 @@ flash and RAM in every build, but for a few that the compiler aligns.
 """
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
-from pathlib import Path
-from typing import Any
 
 import numpy as np
+from firmwarerun import CORES
 from msgspec.structs import replace
 from numpy.typing import NDArray
 from scipy.optimize import linprog
@@ -27,7 +24,7 @@ from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.costs import NAME_BYTES, estimate, sizes, table_bytes, terms
 from thenar.compiler.firmware.layout import GROUPS, Layout
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
-from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.base import Formula
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import COARSE, IntegerTables
@@ -90,14 +87,6 @@ def drawn(seed: int) -> IntegerTables:
     )
 
 
-def runner(target: Target) -> Any:
-    """Return the target if thenar runs and counts its code, otherwise its core in tests/qemu."""
-    if target.kind:
-        return target
-    sys.path.append(str(Path(__file__).parents[1] / "tests" / "qemu"))
-    return import_module("qemu").CORES[target.name]
-
-
 def measured(name: str, seed: int) -> Point | None:
     """Return the point of a drawn build on a target; None where it does not fit."""
     target, tables = TARGETS.named(name), drawn(seed)
@@ -108,7 +97,8 @@ def measured(name: str, seed: int) -> Point | None:
     frames = joined(extreme_frames(tables), random_frames(tables, FRAMES, 1))
     sent = layout.frame_bytes(frames.bits, frames.codes)
     try:
-        found = runner(target).run(library.files, "glove", layout, sent)
+        # thenar itself runs targets of a kind alone.
+        found = (target if target.kind else CORES[name]).run(library.files, "glove", layout, sent)
         flash, ram = sizes(library, target)
     except FirmwareError:
         return None

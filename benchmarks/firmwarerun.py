@@ -2,7 +2,9 @@
 emulated cores of 32 bits.
 """
 
+import sys
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,8 @@ from thenar.compiler.firmware.tools import call
 
 AVR = TARGETS["avr328p"]
 QEMU = Path(__file__).parents[1] / "tests" / "qemu"
+sys.path.append(str(QEMU))
+CORES = import_module("qemu").CORES
 # Prints what a function of one instruction and then what each frame took.
 MAIN = """
 #include <stdbool.h>

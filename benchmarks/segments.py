@@ -37,7 +37,7 @@ _SANITIZE = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover
 Lanes = NDArray[np.int16]
 Flags = NDArray[np.bool_]
 
-# It starts when it is called first, and returns the least byte of the result. `copy` is called alone to subtract its cycles.
+# It starts when it is called first, and returns a byte alone. `copy` also runs alone, to subtract its cycles.
 _PROGRAM = """\
 #include "thenar_hand_segments.h"
 struct {{ int16_t lanes[{lanes}]; uint8_t best, refused; }} input;
