@@ -29,6 +29,7 @@ from liveplay import (
     Memory,
     Played,
     board,
+    free_port,
     glove,
     joints_alone,
     performed,
@@ -102,7 +103,7 @@ def _step_us(run: Callable[[], object], feed: Memory, closed: int, sensors: byte
 
 def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[Callable[[], object], Memory]:
     """Return a function that processes one moment with everything up to this stage, and its feed."""
-    own = Path(stack.enter_context(TemporaryDirectory(dir=folder)))
+    own, port = Path(stack.enter_context(TemporaryDirectory(dir=folder))), free_port()
     harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
     if stage == 0:
         recognizer = LiveSystem.of(scene.build, harness).recognizer()
@@ -112,7 +113,7 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
             recognizer.step(now_us(), time.time_ns() // 1000, taken.switches, taken.glove)
 
         return step, feed
-    sinks = ["jsonl:/dev/null?every", "tcp:0"] if stage >= 4 else ["jsonl:/dev/null"]
+    sinks = ["jsonl:/dev/null?every", f"tcp:{port}"] if stage >= 4 else ["jsonl:/dev/null"]
     record = own / "run.mcap" if stage >= 2 else None
     run = Glove(
         scene.build,
@@ -125,7 +126,7 @@ def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[C
     )
     stack.enter_context(run)
     if stage >= 4:
-        stack.enter_context(read_along(own / "socket"))
+        stack.enter_context(read_along(port))
     return lambda: next(run), feed
 
 

@@ -2,6 +2,7 @@
 a performance, and frames in memory.
 """
 
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -28,8 +29,8 @@ from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.bench import Bench
 from thenar.simulator.playing.performance import Performance, of_scene
 
-# Reads a socket as fast as lines come, so that they are sent and not lost.
-_READER = "import socket, sys; s = socket.socket(socket.AF_UNIX); s.connect(sys.argv[1])\nwhile s.recv(65536): pass"
+# Reads a port as fast as lines come, so that they are sent and not lost.
+_READER = "import socket, sys; s = socket.create_connection(('127.0.0.1', sys.argv[1]))\nwhile s.recv(65536): pass"
 SENSORS: Literal[18] = 18
 STATUS = ALWAYS | PLUGGED
 # How long a frame from memory counts as fresh: even a busy computer makes none of them old.
@@ -158,10 +159,16 @@ def restless(switches: int, frames: int, seed: int) -> list[tuple[int, bytes]]:
     return [(closed, raw.tobytes()) for closed, raw in zip(masks, sensors, strict=True)]
 
 
+def free_port() -> int:
+    """Return a port of this machine that nobody serves."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
 @contextmanager
-def read_along(socket: Path) -> Iterator[None]:
-    """Let a separate process read a socket."""
-    with subprocess.Popen([sys.executable, "-c", _READER, str(socket)]) as reader:
+def read_along(port: int) -> Iterator[None]:
+    """Let a separate process read the lines at a port of this machine."""
+    with subprocess.Popen([sys.executable, "-c", _READER, str(port)]) as reader:
         try:
             yield
         finally:

@@ -15,7 +15,7 @@ from typing import Any
 
 import msgspec
 import smbus2.smbus2
-from liveplay import read_along
+from liveplay import free_port, read_along
 
 import thenar.drivers.i2c.node
 from thenar.runtime import Glove
@@ -62,16 +62,16 @@ class Counted:
 def rate(build: str, glove: str, seconds: float) -> Rate:
     """Run with all sinks on for `seconds`, once all devices are ready."""
     with TemporaryDirectory() as name:
-        folder = Path(name)
+        folder, port = Path(name), free_port()
         run = Glove(
             build,
             glove,
             preshapes="barrett_bh8",
-            sinks=[f"jsonl:{folder}/lines?every", "tcp:0"],
+            sinks=[f"jsonl:{folder}/lines?every", f"tcp:{port}"],
             record=folder / "run.mcap",
             status=True,
         )
-        with run, read_along(folder / "socket"):
+        with run, read_along(port):
             feed = Counted(run.sources)
             run.feed = feed.take
             _run(run, _START_S, until_well=True)

@@ -21,7 +21,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from liveplay import Played, board, glove, performed, played, run_arguments, wired, with_glove
+from liveplay import Played, board, free_port, glove, performed, played, run_arguments, wired, with_glove
 from msgspec.structs import replace
 from scipy.stats import theilslopes
 
@@ -53,14 +53,13 @@ class Sample:
 
 
 class Reader:
-    """Reads the lines of a run's socket."""
+    """Reads the lines that a run sends to a port of this machine, once it serves it."""
 
-    def __init__(self, path: Path) -> None:
-        self._socket = socket.socket(socket.AF_UNIX)
+    def __init__(self, port: int) -> None:
         end = time.monotonic() + MINUTE_S
         while True:
             try:
-                self._socket.connect(str(path))
+                self._socket = socket.create_connection(("127.0.0.1", port))
                 return
             except OSError:
                 if time.monotonic() > end:
@@ -134,12 +133,15 @@ def soak(folder: Path, minutes: float) -> list[str]:
     every_s = min(MINUTE_S, minutes * MINUTE_S / 6)
     with ExitStack() as stack:
         bench = stack.enter_context(performed(scene, glove_of_all(scene), folder))
-        sinks = ("--sink", "tcp:0", "--sink", "jsonl:/dev/null", "--record", str(folder / "soak.mcap"), "--status")
+        port, record = free_port(), str(folder / "soak.mcap")
+        sinks = ("--sink", f"tcp:{port}", "--sink", "jsonl:-", "--record", record, "--status")
         arguments = run_arguments(scene.folder, bench.harness, folder, *sinks)
         command = [sys.executable, "-c", LIMITED, str(MOST_FILE), sys.executable, "-m", "thenar.cli", *arguments]
-        run = stack.enter_context(subprocess.Popen(command, env=os.environ | bench.environment))
+        # umockdev hides /dev/null from a process that opens it by name.
+        nothing, environment = subprocess.DEVNULL, os.environ | bench.environment
+        run = stack.enter_context(subprocess.Popen(command, env=environment, stdout=nothing))
         stack.callback(run.terminate)
-        reader, samples = Reader(folder / "socket"), list[Sample]()
+        reader, samples = Reader(port), list[Sample]()
         reader.lines(time.monotonic() + every_s / 10)
         for number in range(1, round(minutes * MINUTE_S / every_s) + 1):
             if run.poll() is not None:
