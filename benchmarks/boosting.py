@@ -32,7 +32,6 @@ from weka import installed, logitboost, write_arff
 from thenar.compiler.trainers.logit import fit_logit
 from thenar.compiler.trainers.logitboost import boost
 from thenar.compiler.trainers.newton import MINIMA
-from thenar.runtime.model.tables import winners
 
 CLASSES, ROUNDS = 14, 100
 # Weka takes minutes with more rows.
@@ -113,10 +112,6 @@ def main() -> None:
     here = {"Weka": installed(), "LightGBM": find_spec("lightgbm")}
     if missing := [name for name, found in here.items() if not found]:
         console.print(f"Not installed, and left out: {', '.join(missing)}")
-    bits, codes, labels = grasp_like(1400, seed=1)
-    X = np.hstack([bits, codes])
-    stumps, _ = boost(X, labels, CLASSES, rounds=ROUNDS)
-    console.print(f"Rows of the first training set recognised: {(winners(stumps.scores(X)) == labels).mean():.4f}")
 
 
 if __name__ == "__main__":

@@ -14,24 +14,12 @@ import argparse
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from firmwaredata import (
-    CUTS,
-    JOINTS,
-    LINE,
-    PORTS,
-    SWITCHES,
-    Fold,
-    Predictor,
-    Settings,
-    folds,
-    rates,
-    raw,
-    split,
-    trained,
-)
+from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Fold, Predictor, folds, rates, raw, split
 from firmwarepeers import peers
 from firmwarerun import AVR, CORES, on_avr, on_core
 from msgspec import structs
@@ -40,6 +28,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.costs import fit_for
@@ -48,6 +37,7 @@ from thenar.compiler.firmware.sensors import Sensors, sensors_of
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.compiler.model.collapse import collapse
+from thenar.compiler.trainers.base import Model
 from thenar.runtime.code_line import CodeLine
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
@@ -77,6 +67,7 @@ COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + 
 # Flags of thenar's Makefiles: functions that are not called are not linked.
 _HOW = ("-Os", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
 Frames = NDArray[np.uint8]
+Settings = tuple[tuple[str, Any], ...]
 
 
 @dataclass(frozen=True)
@@ -98,7 +89,7 @@ class Ours:
     def integers(self, fold: Fold) -> IntegerTables:
         """Return the integer tables of a fold."""
         samples = fold.samples(joints=self.joints)
-        tables = collapse(trained(self.trainer, self.settings, fold, joints=self.joints), SWITCHES)
+        tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
         return quantise(tables, samples.switches, samples.codes, 16, self.bits)
 
     def predictor(self, fold: Fold) -> Predictor:
@@ -108,7 +99,8 @@ class Ours:
 
 
 BINS = ("max_bins", 8)
-FEW = (("max_bins", 4),)
+# The pull of a line is that of scikit-learn's logistic regression with C = 1, which the peers take.
+FEW, LINE = (("max_bins", 4),), (("penalty", 0.5),)
 OURS = (
     Ours("logitboost", 16, (("rounds", 100), BINS)),
     Ours("logit", 16, (BINS,)),
@@ -117,6 +109,12 @@ OURS = (
     *(Ours("linear", 8, (*LINE, ("sparsity", sparsity))) for sparsity in (0.5, 0.6)),
     Ours("logit", 16, (BINS,), joints=False),
 )
+
+
+@cache
+def _trained(trainer: str, settings: Settings, fold: Fold, joints: bool) -> Model:
+    member = TRAINERS.named(trainer)
+    return member.train(fold.samples(joints=joints), member.candidates(dict(settings))[0] | dict(settings))
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,6 @@ Switches are placed on the training rows of each fold: test rows are never seen 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,23 +12,18 @@ from rich.console import Console
 from rich.progress import track
 from sklearn.model_selection import LeaveOneGroupOut, StratifiedKFold
 
-from thenar.compiler import TRAINERS
 from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.samples import Samples
-from thenar.compiler.trainers.base import Model
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import simulate
 
 SWITCHES, JOINTS, FOLDS, SEED = 33, 16, 4, 1
 PORTS = -(-SWITCHES // 8)
 CUTS = ("four-fold", "subject left out")
-# The pull of a line is that of scikit-learn's logistic regression with C = 1.
-LINE = (("penalty", 0.5),)
 
 Rows = NDArray[np.uint8]
 Labels = NDArray[np.intp]
 Predictor = Callable[[Rows], Labels]
-Settings = tuple[tuple[str, Any], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,13 +60,6 @@ def folds(console: Console) -> Mapping[str, list[Fold]]:
             rows = np.hstack([grasp_set.switches[:, kept], degrees]).astype(np.uint8)
             found[cut].append(Fold(rows[train], y[train], rows[test], y[test], tuple(map(str, grasps))))
     return found
-
-
-@cache
-def trained(trainer: str, settings: Settings, fold: Fold, *, joints: bool = True) -> Model:
-    """Return a model of one of thenar's trainers on the training rows of a fold."""
-    member = TRAINERS.named(trainer)
-    return member.train(fold.samples(joints=joints), member.candidates(dict(settings))[0] | dict(settings))
 
 
 def split(X: Rows, *, joints: bool = True) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:

@@ -1,25 +1,28 @@
 """Logistic regression in int8, handwritten for an AVR as a careful engineer would: joints are multiplied.
 
-The weights are those of thenar's `linear`, so that only the code differs. Scores are relative to the last class, so
-that 13 sums, a pointer and two operands fill the registers. A code is clamped to its training range, and multiplied by
-an immediate weight of each class (`mulsu`); a weight of 0 costs nothing. The sums of the joints are SHIFT bits finer
-than the rest. They are followed by groups of switches, halves of the bytes as read or whole ones, whose rows
+Scores are relative to the last class, so that 13 sums, a pointer and two operands fill the registers. A code is clamped
+to its training range, and multiplied by an immediate weight of each class (`mulsu`); a weight of 0 costs nothing, so
+the smallest may be pruned, and the others are fitted again. The sums of the joints are SHIFT bits finer than the rest.
+They are followed by groups of switches, halves of the bytes as read or whole ones, whose rows
 are bytes above the minimum of a class. No sum exceeds 16 bits, which is checked for all possible rows.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
-from firmwaredata import JOINTS, LINE, PORTS, SWITCHES, Fold, Labels, Rows, split, trained
+from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Labels, Rows, split
 from numpy.typing import NDArray
-
-from thenar.compiler.model.collapse import collapse
+from scipy.optimize import minimize
+from scipy.special import logsumexp
 
 _LIMIT, _BYTE = 32767, 255
 SHIFT = 3  # by which the joints' sums are finer
+# scikit-learn's C of the fit of a pruned model: fewer weights need less of a pull. The full model has 1.
+REFIT_C = 3.0
 _SUMS = (2, 4, 6, 8, 10, 12, 14, 18, 20, 22, 24, 26, 28)  # r17:r16 are the operands, r31:r30 the pointer
 Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,14 +138,51 @@ def _best() -> list[str]:
     return [*lines, "tst r31", "brpl 1f", f"ldi r16, {len(_SUMS)}", "1: mov r24, r16", "clr r25"]
 
 
+def fitted(inputs: Floats, y: Labels, kept: Floats, C: float, start: Floats) -> Floats:
+    """Return the weights (d, K - 1), relative to the last class, of a logistic regression that has only those `kept`.
+
+    C is scikit-learn's. The first input is the constant, whose weights are not penalised.
+    """
+    hits = np.eye(kept.shape[1] + 1)[y]
+
+    def loss(flat: Floats) -> tuple[float, Floats]:
+        weights = flat.reshape(kept.shape) * kept
+        scores = np.hstack([inputs @ weights, np.zeros((len(inputs), 1))])
+        whole = logsumexp(scores, axis=1, keepdims=True)
+        # scikit-learn's penalty, which does not depend on the class that the weights are relative to.
+        pull = (weights - weights.sum(axis=1, keepdims=True) / scores.shape[1]) / C
+        pull[0] = 0
+        slope = inputs.T @ (np.exp(scores - whole) - hits)[:, :-1] + pull
+        return float((whole - scores)[hits > 0].sum() + (pull * weights).sum() / 2), (slope * kept).ravel()
+
+    found = minimize(loss, start.ravel(), jac=True, method="L-BFGS-B", options={"maxiter": 1000})
+    return found.x.reshape(kept.shape) * kept
+
+
+@cache
+def pruned(fold: Fold, share: float) -> tuple[Floats, Floats, Floats]:
+    """Return bias (K - 1,) and weights of switches and codes, relative to the last class, with `share` of the joints'
+    weights: the largest of standardised joints, fitted again together with the switches' and the bias.
+    """
+    bits, codes = split(fold.X)
+    mean, deviation = codes.mean(axis=0), codes.std(axis=0) + 1e-9
+    inputs = np.hstack([np.ones((len(bits), 1)), bits, (codes - mean) / deviation])
+    everything = np.ones((inputs.shape[1], len(fold.grasps) - 1))
+    weights = fitted(inputs, fold.y, everything, 1.0, 0 * everything)
+    if share < 1:
+        size = np.abs(weights[1 + SWITCHES :])
+        kept = np.vstack([everything[: 1 + SWITCHES], size >= np.quantile(size, 1 - share)])
+        weights = fitted(inputs, fold.y, kept, REFIT_C, weights)
+    joints = weights[1 + SWITCHES :] / deviation[:, np.newaxis]
+    return weights[0] - mean @ joints, weights[1 : 1 + SWITCHES], joints
+
+
 def integer_logit(fold: Fold, group: int, share: float = 1.0) -> IntegerLogit:
     """Return the integers at the finest scale at which weights, rows and sums fit, with a `share` of joint weights."""
-    tables = collapse(trained("linear", (*LINE, ("sparsity", 1 - share)), fold), SWITCHES)
-    bias, switches, joints = (
-        (rows - rows[..., -1:])[..., :-1]
-        for rows in (tables.bias, tables.switch_rows, np.array([line.row for line in tables.lines]))
-    )
-    low, high = np.array([(line.low, line.high) for line in tables.lines]).T
+    bias, switches, joints = pruned(fold, share)
+    codes = split(fold.X)[1].astype(np.int64)
+    low, high = codes.min(axis=0), codes.max(axis=0)
+    bias = bias + low @ joints
     scale = 4096.0
     while True:
         whole = IntegerLogit(

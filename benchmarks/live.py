@@ -51,7 +51,7 @@ from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.sources import FrameBuffer
 from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.base import SOURCES, Source
+from thenar.runtime.sources.base import SOURCES
 
 MOST_US, REST_US, ROW_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 60, 25, 200, 0.9, 45, 20
 FRAMES, TURNS = 500, 8
@@ -161,23 +161,18 @@ def row_us(scene: Played, folder: Path) -> tuple[float, float]:
         for number, row in enumerate(rows.tolist()):
             line.sendto(f"{5 * number},{','.join(map(str, row))}\n".encode(), ("127.0.0.1", PORT))
             began_s = time.thread_time()
-            _put(source, buffer)
+            for _ in range(2):  # its switches and its joints
+                frame = source.read(1.0)
+                assert frame is not None
+                if isinstance(frame, SwitchFrame):
+                    buffer.put_switches(0, frame, source.longest_us)
+                else:
+                    buffer.put_glove(frame, source.longest_us)
             there_s = time.thread_time()
             next(glove)
             found.append((there_s - began_s, time.thread_time() - there_s))
     way, loop = 1e6 * np.median(found, axis=0)
     return float(way), float(loop)
-
-
-def _put(source: Source, buffer: FrameBuffer) -> None:
-    """Read a row: its switches and its joints."""
-    for _ in range(2):
-        frame = source.read(1.0)
-        assert frame is not None
-        if isinstance(frame, SwitchFrame):
-            buffer.put_switches(0, frame, source.longest_us)
-        else:
-            buffer.put_glove(frame, source.longest_us)
 
 
 def rates(scene: Played, seconds: float, folder: Path) -> Table:
@@ -236,10 +231,9 @@ def main() -> None:
             f"{ROW_US}), of which {loop_us:.0f} are the live thread's\n"
         )
         console.print(rates(scenes[0], options.seconds, folder), "")
-        passed = way(scenes[0], folder)
-        calls = ", ".join(f"{calls:.0f} in {thread}" for thread, calls in sorted(passed.calls.items()))
-        console.print(f"A frame passes {len(passed.files)} files (at most {MOST_FILES}); calls a grasp: {calls}")
-        console.print("\n".join(passed.files), "")
+        files, calls = way(scenes[0], folder)
+        console.print(f"A frame passes {len(files)} files (at most {MOST_FILES}), in {calls:.0f} calls")
+        console.print("\n".join(files), "")
         console.print(
             f"Peak of `thenar run`: {peak_mib(scenes[0], folder, options.seconds):.0f} MiB (at most {MOST_MIB})"
         )

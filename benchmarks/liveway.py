@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
@@ -25,23 +24,14 @@ _OURS = f"{os.sep}thenar{os.sep}"
 Calls = dict[str, int]
 
 
-@dataclass(frozen=True, slots=True)
-class Way:
-    """Files that a frame passes, and calls of functions in them per grasp, by the thread that makes them."""
-
-    files: tuple[str, ...]
-    calls: dict[str, float]
-
-
-def way(scene: Played, folder: Path) -> Way:
-    """Return the path of a row of a board and a CyberGlove, to JSON lines and a preshape."""
+def way(scene: Played, folder: Path) -> tuple[list[str], float]:
+    """Return the path of a row of a board and a CyberGlove, to JSON lines and a preshape: its files, and the calls of
+    functions in them per grasp.
+    """
     before, after = _calls(scene, folder, SHORT), _calls(scene, folder, LONG)
-    grasps = LONG - SHORT
-    found = {key: (count - before.get(key, 0)) / grasps for key, count in after.items()}
-    files = {key.split("|")[1] for key, each in found.items() if each * _EVERY >= 1}
-    threads = sorted({key.split("|")[0] for key in found})
-    calls = {name: sum(each for key, each in found.items() if key.split("|")[0] == name) for name in threads}
-    return Way(tuple(sorted(files)), calls)
+    found = {key: (count - before.get(key, 0)) / (LONG - SHORT) for key, count in after.items()}
+    files = {key.partition("|")[0] for key, each in found.items() if each * _EVERY >= 1}
+    return sorted(files), sum(found.values())
 
 
 def _calls(scene: Played, folder: Path, frames: int) -> Calls:
@@ -54,14 +44,13 @@ def _calls(scene: Played, folder: Path, frames: int) -> Calls:
 
 
 def _profiled(path: Path, arguments: list[str]) -> None:
-    """Run `thenar` and write how often each function of ours was called in each thread."""
+    """Run `thenar` and write how often each function of ours was called."""
     counts = Counter[str]()
 
     def hook(frame: FrameType, event: str, _: object) -> None:
         code = frame.f_code
         if event == "call" and _OURS in code.co_filename:
-            thread = threading.current_thread().name.partition(" at ")[0]
-            counts[f"{thread}|{code.co_filename.rpartition(_OURS)[2]}|{code.co_qualname}"] += 1
+            counts[f"{code.co_filename.rpartition(_OURS)[2]}|{code.co_qualname}"] += 1
 
     threading.setprofile(hook)
     sys.setprofile(hook)

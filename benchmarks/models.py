@@ -107,14 +107,13 @@ def shown(name: str, of: Of, made: Sequence[Line]) -> Table:
         name, yes, how = line.model.name, "yes" if line.model.additive else "", line.model.how
         of_integers = "" if line.integers is None else f"{100 * line.integers.mean:.2f}"
         within = f"{100 * line.rate.low:.1f} to {100 * line.rate.high:.1f}"
-        gap, p = ("", "") if baseline is None or line is baseline else _against(line, baseline)
+        gap = p = ""
+        if baseline is not None and line is not baseline:
+            gap = f"{100 * (baseline.rate.mean - line.rate.mean):+.2f}"
+            p = f"{p_value(line.hits, baseline.hits):.2g}"
         numbers = (f"{100 * line.rate.mean:.2f}", within, of_integers, gap, p, f"{line.cpu_s:.1f}")
         table.add_row(name, yes, how, *numbers, style="bold" if line.model.ours else "")
     return table
-
-
-def _against(line: Line, baseline: Line) -> tuple[str, str]:
-    return f"{100 * (baseline.rate.mean - line.rate.mean):+.2f}", f"{p_value(line.hits, baseline.hits):.2g}"
 
 
 def available(names: Sequence[str]) -> Iterator[Model]:
