@@ -280,6 +280,35 @@ def test_an_edit_waits_for_work_that_goes_on(browser: Browser, studio: Start) ->
     browser.wait(lambda: not browser.text("busy"))
 
 
+@pytest.mark.parametrize("width", [400, 1000, 1920])
+def test_a_refusal_is_seen_wherever_the_page_is_scrolled(browser: Browser, studio: Start, width: int) -> None:
+    """It is read out, and hides nothing that has the focus."""
+    open_errors(browser, studio(), width=width)
+    browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
+    cards(browser, 1)
+    truth = said(browser, "#trials article > p")[0].split(" ")[0]
+    browser.driver.find_element(By.CSS_SELECTOR, f"#type option[value={truth}]").click()
+    browser.driver.find_element(By.ID, "relabel").send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.text("refused") == f"these trials are {truth} already")
+    script = """const [id, share] = arguments, element = document.getElementById(id);
+        const height = document.documentElement.scrollHeight - innerHeight;
+        scrollTo(0, share * height);
+        if (id !== "refused") element.focus();
+        const { x, y, width, height: high, bottom } = element.getBoundingClientRect();
+        const seen = document.elementFromPoint(x + width / 2, y + high / 2);
+        return height > 200 && y >= 0 && bottom <= innerHeight && element.contains(seen)"""
+    for share in (0, 0.3, 0.7, 1):
+        assert browser.script(script, "refused", share)
+        assert browser.axe() == []
+    for name in ("of", "next", "map", "relabel"):
+        assert browser.script(script, name, 1), name
+    assert browser.script("return document.getElementById('refused').role") == "alert"
+    assert browser.script("return document.documentElement.scrollWidth <= innerWidth")
+    browser.picture(f"refused-{width}")
+    browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
+    browser.wait(lambda: not browser.text("refused"))
+
+
 def test_the_next_error_follows_the_one_that_was_left_out(browser: Browser, studio: Start) -> None:
     opened = studio()
     choose_two(browser, opened)
