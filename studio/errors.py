@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from thenar.compiler.artifact.training import trained_on
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recogniser import predicted_classes
-from thenar.compiler.recordings.edits import named
 from thenar.compiler.samples import decided, select_inputs
-from thenar.compiler.text import counted
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.model.terms.bit import Bit
@@ -19,7 +17,7 @@ from thenar.runtime.names import shortened
 from thenar.runtime.web.server import message
 
 from .choose import ChoosePage
-from .edits import change, last_action, load_edits, undo
+from .edits import change, undo
 from .quick import QuickAccuracy, strongest
 from .sensors import sensors_read
 from .studio import Asked, Handler, Report, Studio
@@ -110,7 +108,7 @@ class ErrorsPage:
         studio.add(requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
 
     def read(self, report: Report) -> None:
-        """Let the build in use recognise the recordings, if it can, and show what was edited."""
+        """Let the build in use recognise the recordings, if it can."""
         self._build, name, why = None, "", ""
         try:
             if (built := self._project.build()) is not None:
@@ -118,7 +116,6 @@ class ErrorsPage:
         except (ThenarError, OSError) as reason:
             why = f"build {self._project.state.build} is left out: {reason}"
         self._studio.publish("recogniser", message("recogniser", build=name, why=why))
-        self._tell_edits()
 
     def _errors(self, asked: Asked) -> bytes:
         """Return as which type the sensors, or the build, recognise every trial."""
@@ -168,12 +165,4 @@ class ErrorsPage:
             if asked.name not in ("", *now.quick.held.taxonomy.types):
                 raise ThenarError(f"{shortened(repr(asked.name))} is not a grasp type of these recordings")
             change(log, [now.trials[trial] for trial in asked.trials], asked.name)
-        self._tell_edits()
         self._studio.changed()
-
-    def _tell_edits(self) -> None:
-        """Show the last action that can be taken back."""
-        last = last_action(load_edits(self._project.edits)[0])
-        what = counted(len(last), "trial") if len(last) > 1 else named(last[0].of) if last else ""
-        done = f"{what} {f'made {last[0].new}' if last[0].new else 'left out'}" if last else ""
-        self._studio.publish("edits", message("edits", words=done))

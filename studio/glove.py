@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from queue import SimpleQueue
 from threading import Event
 from time import monotonic
 from typing import get_args
@@ -40,7 +39,6 @@ _MOST_KEPT = 3000
 # By this much a value changes when a hand moves, and so often do others while a sensor that stays the same is stuck.
 _LEAST_CHANGE = {"switch": 1, "pad": 10, "joint": 3}
 _CHANGES_OF_OTHERS = {"switch": 20, "pad": 500, "joint": 500}
-_POSE_KEYS: tuple[PoseKey, ...] = get_args(PoseKey)
 _PORTS = ("serial/by-id/*", "ttyUSB*", "ttyACM*")
 _ADVICE = {
     "lost": "cannot be read: check its wire and its place in glove.toml",
@@ -55,7 +53,6 @@ class GlovePage:
 
     def __init__(self, studio: Studio) -> None:
         self._studio, self._project = studio, studio.project
-        self._keys = SimpleQueue[PoseKey]()
         self._proposal = ""
         self._past: Sequence[deque[tuple[float, int | None]]] = ()
         requests: Mapping[str, Callable[[Asked], bytes | None]] = {
@@ -64,7 +61,6 @@ class GlovePage:
             "connect": self._on_connect,
             "past": self._on_past,
             "calibrate": self._on_calibrate,
-            "step": self._on_step,
         }
         studio.add(requests, self.read)
 
@@ -194,8 +190,7 @@ class GlovePage:
         work = {"joint": self._calibrate_joints, "pad": self._calibrate_pads}.get(asked.name)
         if work is None or not self._project.harness.exists():
             raise SettingError("joints or pads of a glove.toml can be calibrated")
-        self._keys = SimpleQueue()
-        self._studio.station.start("calibrating", partial(self._calibrate, work))
+        self._studio.station.start("calibrating", partial(self._calibrate, work), get_args(PoseKey))
 
     def _calibrate(self, work: Callable[[Event], None], stop: Event) -> None:
         try:
@@ -218,7 +213,7 @@ class GlovePage:
                 "keys": {key: what for key, what in words.items() if key in offered},
             }
             self._studio.publish("calibrating", message("calibrating", content))
-            return self._pressed()
+            return self._studio.station.pressed()
 
         guide = lead_poses(str(self._project.harness), _BAUD, _HOLD_S, view, stop)
         if guide is None:
@@ -239,22 +234,12 @@ class GlovePage:
                 "keys": {"accept": words[stage]} if stage in words else {},
             }
             self._studio.publish("calibrating", message("calibrating", content))
-            return "accept" in self._pressed()
+            return "accept" in self._studio.station.pressed()
 
         found = lead_presses(self._project.harness, _HOLD_S, view, stop, self._project.state.wearer)
         if found is not None:
             names, pads = found
             self._written("taxels", "taxels.toml", [line.name for line in pads.taxels], names, pads.to_toml())
-
-    def _pressed(self) -> list[PoseKey]:
-        return [self._keys.get() for _ in range(self._keys.qsize())]
-
-    def _on_step(self, asked: Asked) -> None:
-        if asked.name not in _POSE_KEYS:
-            raise SettingError(f"there is no key {shortened(repr(asked.name))}")
-        if self._studio.station.doing != "calibrating":
-            raise SettingError("nothing is calibrated now")
-        self._keys.put(asked.name)
 
     def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> None:
         """Write a calibration of sensors, and name it in glove.toml."""

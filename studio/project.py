@@ -13,7 +13,7 @@ import msgspec
 from thenar.compiler.glove.prices import Part, load_prices
 from thenar.compiler.hand import HandShape, load_layout
 from thenar.compiler.recordings import RecordingError
-from thenar.compiler.recordings.edits import TrialId, apply_edits
+from thenar.compiler.recordings.edits import TrialId, apply_edits, trials_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.drivers.errors import SettingError, ThenarError
@@ -138,9 +138,12 @@ class Project:
             none = "the project has no recordings yet: record some, or import a table with thenar import"
             raise SettingError("; ".join(unused) or none)
         edits, damaged = load_edits(self.edits)
-        # Those of sets that were left aside wait.
-        aside = {one.name for one in self.members("set")} - sets.keys()
-        grasp_set, trials, missing = apply_edits(sets, [edit for edit in edits if edit.set not in aside])
+        # Those of sets that were left aside wait, and so do those of recordings for trials that get into a set later.
+        there = {trial for name, one in sets.items() for trial in trials_of(name, one)}
+        waiting = {one.name for one in self.members("set")} - sets.keys()
+        waiting |= {f"{Path(one.name).stem}.grasps" for one in self.members("recording")}
+        used = [edit for edit in edits if edit.set not in waiting or edit.of in there]
+        grasp_set, trials, missing = apply_edits(sets, used)
         return grasp_set, trials, [*unused, *missing, *filter(None, [damaged])]
 
     @property

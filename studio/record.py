@@ -1,23 +1,23 @@
 """The page *Record*: guided collections into the project, begun, continued, led, and imported when they end.
 
-It also leads those that are begun on the page *Wearer*, to which a build is then adapted. While one runs, its topics
-are "collecting", the state of the guide, and "trials", what was accepted so far.
+It also leads those that are begun on the page *Wearer*, to which a build is then adapted. Their topics are
+"collecting", the state of the guide, and "trials", what was accepted so far.
 """
 
 import json
 import secrets
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
-from queue import SimpleQueue
-from threading import Event
+from threading import Event, Lock
 
 import numpy as np
 from msgspec.structs import replace
 
 from thenar.compiler.recordings import check_names
-from thenar.compiler.recordings.edits import trials_of
+from thenar.compiler.recordings.edits import TrialId
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.compiler.recordings.taxonomy import ANY, Taxonomy, collected, tasks_of
@@ -26,16 +26,15 @@ from thenar.runtime.calibration import RAW
 from thenar.runtime.files import write_atomically
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.glove import Glove
-from thenar.runtime.names import shortened
 from thenar.runtime.published import NONE, DeviceHealth
 from thenar.runtime.recording.guide import KEYS, CollectionGuide, Journal, Key, Trial, planned, read_journal
 from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label
+from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.web.server import message
 
 from .collecting import collect, standing, task
-from .edits import change, load_edits
+from .edits import change, load_edits, restore
 from .quick import QuickAccuracy
 from .sensors import GloveSensors
 from .studio import Asked, Handler, Report, Studio, glove_message
@@ -55,20 +54,12 @@ class RecordPage:
 
     def __init__(self, studio: Studio, wearer: WearerPage) -> None:
         self._studio, self._project, self._wearer = studio, studio.project, wearer
-        # Of the collection that runs, or was the last: the keys that wait, the frames of its captured trials, what was
-        # shown last (the guide's step and its time, and the accepted trials), its trials, and the set that it became.
-        self._keys: SimpleQueue[Key] | None = None
-        self._captured = dict[int, Frames]()
-        self._shown = -1, 0
-        self._accepted: Sequence[int] | None = None
-        self._trials = dict[int, Trial]()
-        self._recorded: Path | None = None
+        self._sitting: Sitting | None = None
         requests: dict[str, Handler] = {
             "record": self._begin,
             "continue": self._continue,
             "wear": self._wear,
-            "key": self._press,
-            "recorded": self._trial,
+            "recorded": lambda asked: self._last.seen(asked.trial),
             "relabel": self._relabel,
         }
         studio.add(requests, self.read)
@@ -80,10 +71,8 @@ class RecordPage:
             {"id": id_, "name": path.name, "subject": collection.subject, "done": done, "total": total}
             for id_, path, collection, done, total in self._unfinished()
         ]
-        name = "" if self._recorded is None else self._recorded.name
-        latest = {edit.of: edit.new for edit in load_edits(self._project.edits)[0] if edit.of[0] == name}
-        edits = {trial[5]: new for trial, new in latest.items() if new != trial[3]}
-        self._studio.publish("relabelled", message("relabelled", set=name, trials=edits))
+        if self._sitting is not None:
+            self._sitting.tell()
         self._studio.publish(
             "recordings",
             message(
@@ -94,6 +83,17 @@ class RecordPage:
                 glove=self._project.harness.exists(),
             ),
         )
+
+    @property
+    def _last(self) -> "Sitting":
+        """The collection that runs, or was the last. Raises SettingError before the first."""
+        if self._sitting is None:
+            raise SettingError("nothing was recorded here yet: record, or use the page Errors")
+        return self._sitting
+
+    def _relabel(self, asked: Asked) -> None:
+        self._last.relabel(asked.trial, asked.name)
+        self._studio.changed()
 
     def _unfinished(self) -> list[tuple[str, Path, Collection, int, int]]:
         """Return the collections that can be continued: id, path, collection, and trials done, of how many."""
@@ -167,73 +167,108 @@ class RecordPage:
     # A collection, on the thread of the station.
 
     def _start(self, doing: str, recording: Path, collection: Collection, journal: Journal | None = None) -> None:
-        planned(collection)
-        self._studio.station.start(doing, partial(self._lead, doing, recording, collection, journal))
+        sitting = Sitting(self._studio, doing, recording, collection, journal)
+        self._studio.station.start(doing, partial(self._lead, sitting), KEYS)
 
-    def _lead(self, doing: str, recording: Path, collection: Collection, journal: Journal | None, stop: Event) -> None:
+    def _lead(self, sitting: "Sitting", stop: Event) -> None:
         """Lead a collection, and write the set of all its accepted trials when it ends."""
-        self._keys = keys = SimpleQueue[Key]()
-        self._shown, self._accepted, self._recorded = (-1, 0), None, None
-        self._captured = {} if journal is None else _captured(recording)
-        self._trials = {trial.number: trial for trial in planned(collection)}
+        self._sitting = sitting
         self._studio.publish("finished", message("finished", set=""))
-        self._studio.publish("collecting", message("collecting", stage="waiting", doing=doing))
-        view = partial(self._view, doing, keys, Taxonomy(collection.taxonomy, collection.types))
         try:
-            try:
-                done = collect(self._project.harness, collection, recording, journal, view, stop)
-            finally:
-                self._keys = None
-                self._studio.publish("collecting", message("collecting", stage="over"))
-            if done:
-                self._write(doing, recording, collection, done)
+            if done := sitting.lead(stop):
+                self._write(sitting, done)
         finally:
             self._studio.changed()
 
-    def _write(self, doing: str, recording: Path, collection: Collection, done: int) -> None:
+    def _write(self, sitting: "Sitting", done: int) -> None:
         """Write the set of the accepted trials.
 
         What was recorded for a build has its codes, on whichever page it was continued. Once it is complete, it adapts
         the build, if it is the wearer's.
         """
+        collection, total = sitting.collection, len(sitting.trials)
         build = self._project.build_of(collection.build)
         codings = None if build is None else build[1].manifest.codings
-        grasp_set, report = import_recordings([recording], codings=codings)
-        output, total = recording.with_suffix(".grasps"), len(self._trials)
-        grasp_set.save(output)
-        if doing == "recording":
-            self._recorded = output
+        grasp_set, report = import_recordings([sitting.recording], codings=codings)
+        grasp_set.save(sitting.output)
+        if sitting.doing == "recording":
             warnings = [finding.message for finding in report.warnings]
-            about = {"set": output.name, "size": str(grasp_set.size), "warnings": warnings}
+            about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
             self._studio.publish("finished", message("finished", about, done=done, total=total))
         if build is not None and done == total and collection.subject == self._project.state.wearer:
-            self._studio.queue("adapt", partial(self._wearer.adapt, [output]))
+            self._studio.queue("adapt", partial(self._wearer.adapt, [sitting.output]))
 
-    def _view(
-        self,
-        doing: str,
-        keys: SimpleQueue[Key],
-        taxonomy: Taxonomy,
-        guide: CollectionGuide,
-        devices: Sequence[DeviceHealth],
-    ) -> list[Key]:
+
+class Sitting:
+    """A collection that is led, and its accepted trials, which can be looked at and edited meanwhile and afterwards.
+
+    The log of edits names a trial as the set does that is written at the end, so an edit waits for that.
+
+    Parameters
+    ----------
+    studio : Studio
+        The studio that leads it.
+    doing : str
+        "recording" or "wearer".
+    recording : Path
+        Its file.
+    collection, journal
+        As for `collect`.
+
+    Attributes
+    ----------
+    output : Path
+        The set that is written at the end.
+    trials : dict of int to Trial
+        All trials by their numbers.
+
+    Raises
+    ------
+    SettingError
+        If there are too many trials.
+    """
+
+    def __init__(
+        self, studio: Studio, doing: str, recording: Path, collection: Collection, journal: Journal | None
+    ) -> None:
+        self._studio, self._project = studio, studio.project
+        self.doing, self.recording, self.collection, self._journal = doing, recording, collection, journal
+        self.output = recording.with_suffix(".grasps")
+        self.trials = {trial.number: trial for trial in planned(collection)}
+        self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
+        # The frames of captured trials; the accepted trials, after the first view, and what records them; and of the
+        # last view the guide's step and the time.
+        self._captured = dict[int, Frames]()
+        self._accepted: Sequence[int] = ()
+        self._session: Session | None = None
+        self._shown, self._telling = (-1, 0), Lock()
+
+    def lead(self, stop: Event) -> int:
+        """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
+        self._studio.publish("collecting", message("collecting", stage="waiting", doing=self.doing))
+        # Those of the collection before are no longer shown.
+        self._studio.publish("trials", message("trials", set="", trials=(), types=(), accuracy=None))
+        if self._journal is not None:
+            self._captured = _captured(self.recording)
+        try:
+            return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
+        finally:
+            self._studio.publish("collecting", message("collecting", stage="over"))
+
+    def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
         """Show the guide's state ten times a second and at every change; return the keys pressed."""
         now, (step, shown_us) = now_us(), self._shown
         if step != guide.step:
             if guide.stage == "review" and guide.trial is not None:
                 self._captured[guide.trial.number] = guide.captured
-            if guide.accepted != self._accepted:
-                self._accepted = guide.accepted
-                trials = [self._trials[number] for number in guide.accepted]
-                shown = [(trial.number, trial.grasp, trial.object) for trial in trials]
-                types = list(dict.fromkeys(trial.grasp for trial in self._trials.values()))
-                accuracy = self._accuracy(guide, taxonomy)
-                self._studio.publish("trials", message("trials", trials=shown, types=types, accuracy=accuracy))
+            if self._session is None or guide.accepted != self._accepted:
+                self._session, self._accepted = guide.session, guide.accepted
+                self.tell()
         if step != guide.step or now >= shown_us + _SHOW_US:
             self._shown = guide.step, now
-            prompt, thing = task(guide, taxonomy)
+            prompt, thing = task(guide, self._taxonomy)
             content = {
-                "doing": doing,
+                "doing": self.doing,
                 "stage": guide.stage,
                 "number": guide.done + guide.skipped + 1,
                 "grasp": "" if guide.trial is None else guide.trial.grasp,
@@ -248,17 +283,44 @@ class RecordPage:
             }
             self._studio.publish("collecting", message("collecting", content))
             self._studio.publish("glove", glove_message(devices))
-        return [keys.get() for _ in range(keys.qsize())]
+        return self._studio.station.pressed()
 
-    def _accuracy(self, guide: CollectionGuide, taxonomy: Taxonomy) -> dict[str, object] | None:
-        """Return the quick accuracy of all sensors in the accepted trials, if there are enough."""
-        session = guide.session
-        trials = [self._trials[number] for number in guide.accepted if self._trials[number].grasp != NONE]
-        counts = Counter(trial.grasp for trial in trials)
-        types = {trial.grasp for trial in self._trials.values()} - {NONE}
+    def tell(self) -> None:
+        """Show the accepted trials, and how well they are told apart as they were edited."""
+        with self._telling:
+            if self._session is None:
+                return
+            trials, made = [self.trials[number] for number in self._accepted], self._made()
+            shown = [(trial.number, trial.grasp, trial.object) for trial in trials]
+            types = list(dict.fromkeys(trial.grasp for trial in self.trials.values()))
+            edited = [(trial, made.get(trial.number, trial.grasp)) for trial in trials]
+            accuracy = self._accuracy(self._session, [one for one in edited if one[1] not in ("", NONE)])
+            about = {"set": self.output.name, "trials": shown, "types": types, "accuracy": accuracy}
+            self._studio.publish("trials", message("trials", about))
+
+    def _made(self) -> dict[int, str]:
+        """Return what accepted trials were made, by their numbers; edits of those that were undone are taken back."""
+        numbers = {self._id(trial): trial.number for trial in self.trials.values()}
+        # What is wrong with the log is said by Choose, and ends no recording.
+        with suppress(ThenarError, OSError):
+            made = {edit.of: edit.new for edit in load_edits(self._project.edits)[0] if edit.of in numbers}
+            undone = [trial for trial in made if numbers[trial] not in self._accepted]
+            if restore(self._project.edits, undone):
+                self._studio.changed()
+            return {numbers[trial]: new for trial, new in made.items()}
+        return {}
+
+    def _id(self, trial: Trial) -> TrialId:
+        """Return what the log calls a trial: as `import_recordings` does, which makes one session."""
+        return self.output.name, self.collection.subject, "1", trial.grasp, trial.object, trial.number
+
+    def _accuracy(self, session: Session, edited: Sequence[tuple[Trial, str]]) -> dict[str, object] | None:
+        """Return the quick accuracy of all sensors in trials of these types, if there are enough."""
+        counts = Counter(grasp for _, grasp in edited)
+        types = {*counts, *(trial.grasp for trial in self.trials.values())} - {NONE}
         if len(types) < 2 or any(counts[grasp] < _LEAST for grasp in types):
             return None
-        frames = [self._captured[trial.number] for trial in trials]
+        frames = [self._captured[trial.number] for trial, _ in edited]
         codes = [() if glove is None else tuple(glove.sensors) for _, glove in frames]
         taxels = [[] if switches is None else [code or 0 for code in switches.taxels or ()] for switches, _ in frames]
         closed = [0 if switches is None else switches.closed for switches, _ in frames]
@@ -266,14 +328,14 @@ class RecordPage:
             grasp_set = GraspSet(
                 switches=switch_matrix(closed, len(session.switches)),
                 switch_names=session.switches,
-                codes=np.array(codes, np.uint16).reshape(len(trials), len(session.sensors)),
+                codes=np.array(codes, np.uint16).reshape(len(edited), len(session.sensors)),
                 joints=tuple(Joint(name, RAW, 1, 1.0, 255, 255.0) for name in session.sensors),
-                grasps=np.array([trial.grasp for trial in trials]),
-                taxonomy=taxonomy,
-                subjects=np.array(["me"] * len(trials)),
-                objects=np.array([trial.object for trial in trials]),
-                trials=np.array([trial.number for trial in trials]),
-                taxels=np.array(taxels, np.uint16).reshape(len(trials), len(session.taxels)),
+                grasps=np.array([grasp for _, grasp in edited]),
+                taxonomy=self._taxonomy,
+                subjects=np.array(["me"] * len(edited)),
+                objects=np.array([trial.object for trial, _ in edited]),
+                trials=np.array([trial.number for trial, _ in edited]),
+                taxels=np.array(taxels, np.uint16).reshape(len(edited), len(session.taxels)),
                 taxel_columns=tuple(Joint(name, "counts", 0, 0.0, 1, 1.0) for name in session.taxels),
             )
             quick = QuickAccuracy(grasp_set)
@@ -282,35 +344,25 @@ class RecordPage:
             return {"why": str(reason)}
         return {"of": found.of, "mean": found.mean, "low": found.low, "high": found.high}
 
-    # What is asked of a collection.
-
-    def _press(self, asked: Asked) -> None:
-        if asked.name not in KEYS:
-            raise ThenarError(f"there is no key {shortened(repr(asked.name))}")
-        if self._keys is None:
-            raise ThenarError("nothing is recorded now")
-        self._keys.put(asked.name)
-
-    def _trial(self, asked: Asked) -> bytes:
-        """Return the captured frames of a trial, as the hand shows it."""
-        if asked.trial not in self._captured:
-            raise ThenarError(f"trial {asked.trial} was not recorded")
+    def seen(self, number: int) -> bytes:
+        """Return the captured frames of a trial, as the hand shows them. Raises SettingError if there are none."""
+        if number not in self._captured:
+            raise SettingError(f"trial {number} was not recorded")
         sensors = GloveSensors(self._project.wiring(), self._project.hand())
-        trial, shown = self._trials[asked.trial], sensors.read(*self._captured[asked.trial])
-        return message("recorded", sensors.drawn(shown), trial=trial.number, grasp=trial.grasp, thing=trial.object)
+        trial, shown = self.trials[number], sensors.read(*self._captured[number])
+        return message("recorded", sensors.drawn(shown), trial=number, grasp=trial.grasp, thing=trial.object)
 
-    def _relabel(self, asked: Asked) -> None:
-        """Make a trial of the set that was just recorded another type; an empty name leaves it out."""
-        if self._recorded is None:
-            raise SettingError("nothing was recorded here yet: end the recording first, or use the page Errors")
-        grasp_set = GraspSet.load(self._recorded)
-        trials = {trial[5]: trial for trial in trials_of(self._recorded.name, grasp_set)}
-        if asked.trial not in trials:
-            raise SettingError(f"trial {asked.trial} is not in {self._recorded.name}")
-        if asked.name not in ("", *grasp_set.taxonomy.types):
-            raise SettingError(grasp_set.taxonomy.unknown(asked.name))
-        change(self._project.edits, [trials[asked.trial]], asked.name)
-        self._studio.changed()
+    def relabel(self, number: int, new: str) -> None:
+        """Make an accepted trial another type; an empty one leaves it out.
+
+        Raises SettingError for another trial or type, and as `change` does.
+        """
+        if number not in self._accepted:
+            raise SettingError(f"trial {number} is not among those that were accepted")
+        for grasp in filter(None, (self.trials[number].grasp, new)):
+            if grasp not in self._taxonomy.types:
+                raise SettingError(self._taxonomy.unknown(grasp))
+        change(self._project.edits, [self._id(self.trials[number])], new)
 
 
 @lru_cache(maxsize=1024)

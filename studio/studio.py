@@ -20,10 +20,12 @@ import msgspec
 
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import SettingError, ThenarError
+from thenar.runtime.names import shortened
 from thenar.runtime.published import DeviceHealth
 from thenar.runtime.web.live import shell_message
 from thenar.runtime.web.server import Message, Server, message
 
+from .edits import edits_message
 from .project import Project
 
 PAGES = Path(__file__).parent / "pages"
@@ -101,7 +103,10 @@ class Studio(Closing):
         self, project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose"
     ) -> None:
         self.project, self.jobs = project, jobs
-        self._requests: dict[str, Handler] = {"cancel": self._cancel}
+        self._requests: dict[str, Handler] = {
+            "cancel": self._cancel,
+            "key": lambda asked: self.station.press(asked.name),
+        }
         self._readers = list[Callable[[Report], None]]()
         self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
         self._stale = False
@@ -132,12 +137,15 @@ class Studio(Closing):
         self._queue.put((what, work))
 
     def changed(self) -> None:
-        """Show the project as it is now, after a set or a build came, went or changed."""
+        """Show the project as it is now, after a set or a build came, went or changed, or trials were edited."""
         about, state = tuple[Any, ...](), self.project.state
         # What is wrong with a build is said by the pages that read it.
         with suppress(ThenarError, OSError):
             built = self.project.build()
             about = () if built is None else (built[0], built[1].manifest)
+        # And what is wrong with the log of edits, by Choose.
+        with suppress(ThenarError, OSError):
+            self.publish("edits", edits_message(self.project.edits))
         self.publish("shell", shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer))
         self._show_members()
         # Of several changes the last is read: a recording or a build may come while another is read.
@@ -230,22 +238,34 @@ class Station:
     def __init__(self, publish: Callable[[str, Message], None]) -> None:
         self._publish, self._stop = publish, Event()
         self._thread: Thread | None = None
+        self._keys, self._pressed = tuple[str, ...](), SimpleQueue[str]()
         self.doing = ""
         self._tell("")
 
-    def start(self, doing: str, work: Callable[[Event], None]) -> None:
+    def start(self, doing: str, work: Callable[[Event], None], keys: Sequence[str] = ()) -> None:
         """End what uses the glove, and then start this: `work` gets an event that is set when it is to end.
 
-        Returns at once: a device may take seconds to end. Raises SettingError if the glove is used for something that
-        this may not end.
+        It takes these `keys`, which pages press. Returns at once: a device may take seconds to end. Raises SettingError
+        if the glove is used for something that this may not end.
         """
         if self.doing and self.doing not in _ENDED_BY[doing]:
             raise SettingError(f"the glove is in use: {self.doing}; end that first")
         self._stop.set()
         self._stop, self.doing = Event(), doing
+        self._keys, self._pressed = tuple(keys), SimpleQueue()
         follow = partial(self._run, doing, work, self._stop, self._thread)
         self._thread = Thread(target=follow, name=f"thenar {doing}", daemon=True)
         self._thread.start()
+
+    def press(self, key: str) -> None:
+        """Press a key for what uses the glove. Raises SettingError if it does not take this."""
+        if key not in self._keys:
+            raise SettingError(f"there is no key {shortened(repr(key))} now")
+        self._pressed.put(key)
+
+    def pressed(self) -> list[Any]:
+        """Return the keys that were pressed since the last call."""
+        return [self._pressed.get() for _ in range(self._pressed.qsize())]
 
     def stop(self) -> None:
         """Let what uses the glove end soon."""
@@ -268,7 +288,7 @@ class Station:
         except Exception as reason:
             why = _sentence(reason)
         if stop is self._stop:
-            self.doing = ""
+            self.doing, self._keys = "", ()
         self._tell(self.doing, why)
 
     def _tell(self, doing: str, why: str = "") -> None:

@@ -1,5 +1,5 @@
 // The page Errors: which trials are misread, in a matrix and on a map; the selected ones as small hands; and their edits.
-import { interval, storedChoice } from "./choice.js";
+import { interval, showLastEdit, storedChoice } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { TrialMap } from "./map.js";
 import { openPage } from "./shell.js";
@@ -47,10 +47,7 @@ const ask = openPage({
     if (set && !set.why) list($("unused"), [...set.unused, ...(why ? [why] : [])]);
     if (set && !set.why) look();
   },
-  edits: ({ words }) => {
-    $("undo").disabled = !words;
-    say($("edited"), words && `Last edit: ${words}.`);
-  },
+  edits: ({ words }) => showLastEdit(words),
   work: ({ done, total, what }) => {
     const busy = done < total && what !== "reading";
     say($("busy"), busy ? "Edits are shown here when the work that goes on is finished." : "");

@@ -19,6 +19,7 @@ from thenar.cli import run
 from thenar.compiler import compile_build
 from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
@@ -270,8 +271,8 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_what_was_recorded_outlives_the_studio(
-    board: tuple[LineServer, BoardSender], tmp_path: Path, number: signal.Signals
+def test_what_was_recorded_and_edited_outlives_the_studio(
+    board: tuple[LineServer, BoardSender], hand: HandShape, tmp_path: Path, number: signal.Signals
 ) -> None:
     (tmp_path / "glove.toml").write_text(glove(board[0]))
     command = [sys.executable, "-m", "thenar.cli", "studio", str(tmp_path), "--web", "127.0.0.1:0"]
@@ -281,7 +282,18 @@ def test_what_was_recorded_outlives_the_studio(
         with page(url, "collecting,station") as live:
             live.send(json.dumps({"do": "record", "name": "A", "id": "own", "names": TYPES, "value": 2}))
             lead(live, board[1], 1, "recording")
+            with page(url, "trials,edits") as strip:
+                ((trial, grasp, _),) = until(strip, lambda told: bool(told.get("trials")))["trials"]
+                other = next(name for name in TYPES if name != grasp)
+                strip.send(json.dumps({"do": "relabel", "trial": trial, "name": other}))
+                until(strip, lambda told: bool(told.get("made")))
             process.send_signal(number)
             assert process.wait(PATIENCE_S) == (0 if number == signal.SIGINT else -signal.SIGKILL)
     assert len(read_journal(tmp_path / "A.mcap").accepted) == 1
-    assert (tmp_path / "A.grasps").exists() == (number == signal.SIGINT)
+    recorded = tmp_path / "A.grasps"
+    assert recorded.exists() == (number == signal.SIGINT)
+    if number == signal.SIGKILL:
+        import_recordings([tmp_path / "A.mcap"])[0].save(recorded)
+    assert GraspSet.load(recorded).grasps.tolist() == [grasp]
+    edited, _, unused = Project(tmp_path, hand).recordings()
+    assert (edited.grasps.tolist(), unused) == ([other], [])
