@@ -1,4 +1,4 @@
-"""The page *Errors*: which trials are misread, by chosen sensors or by the build in use, and edits of trials.
+"""The page *Errors*: which trials are misread, by chosen sensors or by a build, and edits of trials.
 
 A page names trials by their numbers; an edit also says which numbering they are of, so that none is for another trial.
 """
@@ -11,13 +11,14 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recogniser import predicted_classes
 from thenar.compiler.samples import decided, select_inputs
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.build import Build
+from thenar.runtime.build import Build, load_manifest
 from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.names import shortened
 from thenar.runtime.web.server import message
 
 from .choose import ChoosePage
 from .edits import change, undo
+from .project import Member
 from .quick import QuickAccuracy, strongest
 from .sensors import sensors_read
 from .studio import Asked, Handler, Report, Studio
@@ -103,26 +104,29 @@ class ErrorsPage:
 
     def __init__(self, studio: Studio, choose: ChoosePage) -> None:
         self._studio, self._project, self._choose = studio, studio.project, choose
-        self._build: BuildReading | None = None
+        # By the builds' ids and the numbering of the recordings.
+        self._readings = dict[tuple[str, str], BuildReading]()
         requests: dict[str, Handler] = {"errors": self._errors, "trials": self._trials}
         studio.add(requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
 
     def read(self, report: Report) -> None:
-        """Let the build in use recognise the recordings, if it can."""
-        self._build, name, why = None, "", ""
-        try:
-            if (built := self._project.build()) is not None:
-                self._build, name = BuildReading(built[0].name, built[1], self._choose.recordings.quick), built[0].name
-        except (ThenarError, OSError) as reason:
-            why = f"build {self._project.state.build} is left out: {reason}"
-        self._studio.publish("recogniser", message("recogniser", build=name, why=why))
+        """Offer the builds that can recognise the recordings."""
+        self._readings, held = {}, self._choose.recordings.quick.held
+        builds, unused = list[Member](), list[str]()
+        for member in self._project.members("build"):
+            try:
+                select_inputs(held, load_manifest(self._project.folder / member.name))
+                builds.append(member)
+            except (ThenarError, OSError) as reason:
+                unused.append(f"build {member.name} is left out: {reason}")
+        self._studio.publish("recognisers", message("recognisers", builds=builds, unused=unused))
 
     def _errors(self, asked: Asked) -> bytes:
-        """Return as which type the sensors, or the build, recognise every trial."""
+        """Return as which type the sensors, or the build with an id, recognise every trial."""
         now, sensors = self._choose.recordings, asked.sensors
         quick = now.quick
-        if asked.name == "build":
-            reading = self._reading
+        if asked.id:
+            reading = self._reading(asked.id)
             sensors = reading.sensors
             about = {"types": reading.types, "read": reading.read.tolist(), **reading.about}
         else:
@@ -131,22 +135,24 @@ class ErrorsPage:
             about |= {"high": found.high, "of": f"{found.of}; quick: not nested"}
         places = quick.places(sensors).tolist()
         about |= {"truth": quick.truth.tolist(), "places": places, "numbering": now.numbering}
-        return message("errors", about, sensors=sensors, asked=(asked.name, asked.sensors))
+        return message("errors", about, sensors=sensors, asked=(asked.id, asked.sensors))
 
     def _trials(self, asked: Asked) -> bytes:
         """Return the values of sensors in trials, and which decided where one was misread."""
         quick, shown = self._choose.recordings.quick, list[dict[str, object]]()
         typical = {kind: [*map(float, shares)] for kind, shares in zip(quick.grasps, quick.typical, strict=True)}
         for trial in asked.trials[:_MOST_SHOWN]:
-            decisive = self._reading.decisive(trial) if asked.name == "build" else quick.decisive(trial, asked.sensors)
+            decisive = self._reading(asked.id).decisive(trial) if asked.id else quick.decisive(trial, asked.sensors)
             shown.append({"trial": trial, "shown": quick.seen(trial).tolist(), "decisive": decisive})
         return message("trials", trials=shown, typical=typical, asked=asked.trials)
 
-    @property
-    def _reading(self) -> BuildReading:
-        if self._build is None:
-            raise ThenarError("no build of this project recognises these recordings: train one")
-        return self._build
+    def _reading(self, build: str) -> BuildReading:
+        """Return how a build recognises the recordings. Raises ThenarError if there is no such build, or it cannot."""
+        now, readings, path = self._choose.recordings, self._readings, self._project.path("build", build)
+        key = build, now.numbering
+        if key not in readings:
+            readings[key] = BuildReading(path.name, Build.load(path), now.quick)
+        return readings[key]
 
     def _edit(self, asked: Asked) -> None:
         """Make trials another type, leave them out if it is empty, or take the last action back; then read again.

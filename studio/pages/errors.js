@@ -12,6 +12,7 @@ const STEP = 24; // the number of trials that are shown at a time
 let set = null; // the message on the set
 let drawn = null; // the message on the hand
 let reply = null; // what the recogniser makes of every trial
+let of = "chosen"; // and which recogniser that is
 let styles = new Map();
 let errors = []; // numbers of misread trials
 let last = -1; // the last of them that was shown
@@ -39,18 +40,20 @@ const ask = openPage({
     look();
   },
   sensors: (message) => (drawn = message),
-  recogniser: ({ build, why }) => {
-    const option = $("of").querySelector("[value=build]") ?? new Option("", "build");
-    option.textContent = `build ${build}`;
-    if (build) $("of").append(option);
-    else option.remove();
-    if (set && !set.why) list($("unused"), [...set.unused, ...(why ? [why] : [])]);
-    if (set && !set.why) look();
+  recognisers: ({ builds, unused }) => {
+    const options = [...$("of").options].slice(0, 2).map(({ value, text }) => ({ id: value, name: text }));
+    fillMenu($("of"), [...options, ...builds.map(({ id, name }) => ({ id, name: `build ${name}` }))], options[0].id);
+    if (!set || set.why) return;
+    list($("unused"), [...set.unused, ...unused]);
+    look();
   },
   edits: ({ words }) => showLastEdit(words),
   work: ({ done, total, what }) => {
     const busy = done < total && what !== "reading";
     say($("busy"), busy ? "Edits are shown here when the work that goes on is finished." : "");
+  },
+  refused: ({ do: what }) => {
+    if (what === "errors") $("of").value = of;
   },
   errors: (message) => {
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
@@ -63,14 +66,16 @@ const ask = openPage({
   },
 });
 
+/** Return the id of the build, or "", and the numbers of the sensors that are to recognise. */
 function request() {
-  const of = $("of").value, every = set.sensors.map((_, sensor) => sensor);
-  return [of, of === "all" ? every : of === "chosen" ? storedChoice(set.sensors) : []];
+  const { value } = $("of");
+  if (value === "chosen") return ["", storedChoice(set.sensors)];
+  return value === "all" ? ["", set.sensors.map((_, sensor) => sensor)] : [value, []];
 }
 
 function look() {
-  const [name, sensors] = request();
-  ask("errors", { name, sensors });
+  const [id, sensors] = request();
+  ask("errors", { id, sensors });
 }
 
 const type = (number) => reply.types[number];
@@ -83,6 +88,7 @@ function named(trial) {
 
 function show(message) {
   reply = message;
+  of = $("of").value;
   errors = reply.truth.flatMap((_, trial) => (misread(trial) ? [trial] : []));
   say($("rate"), interval(reply));
   const using = reply.sensors.length ? `${reply.sensors.length} sensors` : "no sensor: choose some on the page Choose";
@@ -150,7 +156,7 @@ function select(trials) {
 function askFor(from) {
   asked = selected.slice(from, from + STEP);
   $("show-more").hidden = selected.length <= from + STEP;
-  ask("trials", { name: $("of").value, sensors: reply.sensors, trials: asked });
+  ask("trials", { id: reply.asked[0], sensors: reply.sensors, trials: asked });
 }
 
 /** Return the numbers of the selected trials whose box is checked, shown or not. */

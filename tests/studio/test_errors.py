@@ -1,5 +1,6 @@
 """The page *Errors*, in Chromium as a person uses it, and through its WebSocket as an attacker does."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +32,7 @@ from ..sets import grasp_set_of, single_settings
 from .test_choose import answers
 
 Start = Callable[..., Studio]
-ALL = {"do": "errors", "name": "all", "sensors": list(range(10))}
+ALL = {"do": "errors", "sensors": list(range(10))}
 MARGIN = 14  # of the map, in pixels
 
 
@@ -424,11 +425,11 @@ def test_a_build_says_what_it_was_trained_on(
     folder = tmp_path / "recorded"
     folder.mkdir()
     (folder / "build").symlink_to(trained)
-    (folder / "studio.json").write_text('{"build": "build"}')
     opened = studio()
+    (build,) = opened.project.members("build")
     open_errors(browser, opened)
-    use(browser, "build", "build build; 54 of these 72 trials trained it; 5 sensors")
-    reply = errors_of(opened, {"do": "errors", "name": "build"})
+    use(browser, f"'{build.id}'", "build build; 54 of these 72 trials trained it; 5 sensors")
+    reply = errors_of(opened, {"do": "errors", "id": build.id})
     assert browser.text("rate").startswith(f"{100 * reply['mean']:.1f} % [")
     assert "none" in said(browser, "#confusion-table th")
     browser.click("all-errors")
@@ -440,8 +441,37 @@ def test_a_build_says_what_it_was_trained_on(
     others = replace(people, switch_names=tuple(f"pad {number}" for number in range(8)))
     opened = studio(others)
     open_errors(browser, opened)
-    assert not browser.texts("#of [value=build]")
+    assert browser.texts("#of option") == ["the sensors of Choose", "all sensors"]
     assert browser.texts("#unused li")[0].startswith("build build is left out: the recordings lack")
+
+
+def test_every_build_of_the_project_can_be_looked_at(
+    browser: Browser, studio: Start, two_builds: Path, people: GraspSet, tmp_path: Path
+) -> None:
+    """Also one that is not in use; what a damaged one lacks is said, and the page goes on as it was."""
+    folder = tmp_path / "recorded"
+    shutil.copytree(two_builds, folder)
+    opened = studio()
+    ids = {one.name: one.id for one in opened.project.members("build")}
+    open_errors(browser, opened)
+    browser.wait(lambda: browser.texts("#of option")[2:] == ["build few", "build more"])
+    for name, count in (("few", 3), ("more", 4)):
+        use(browser, f"'{ids[name]}'", f"build {name}; 36 of these 72 trials trained it; {count} sensors")
+        build = Build.load(folder / name)
+        rows = zip(*select_inputs(people, build.manifest), strict=True)
+        reply = errors_of(opened, {"do": "errors", "id": ids[name]})
+        assert [reply["types"][one] for one in reply["read"]] == [build.classify(*row) for row in rows]
+    browser.click("all-errors")
+    cards(browser, min(len(misread(reply)), 24))
+    assert said(browser, "#trials article li")
+    assert browser.axe() == []
+    (folder / "few" / "tables.bin").write_bytes(b"")
+    opened.changed()
+    browser.wait(lambda: "reading" not in browser.text("work"))
+    browser.driver.find_element(By.CSS_SELECTOR, f"#of option[value='{ids['few']}']").click()
+    browser.wait(lambda: "tables.bin" in browser.text("refused"))
+    assert "build more" in browser.text("about")
+    browser.wait(lambda: browser.script("return document.getElementById('of').value") == ids["more"])
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (1400, "dark"), (400, "light"), (400, "dark")])
@@ -463,10 +493,10 @@ def test_nothing_keeps_people_out_of_any_state(browser: Browser, studio: Start, 
     ("asked", "why"),
     [
         ({"do": "errors", "sensors": [10]}, "there are 10 sensors"),
-        ({"do": "errors", "name": "build"}, "no build of this project recognises"),
+        ({"do": "errors", "id": "../build"}, "the project has no build '../build'"),
         ({"do": "trials", "trials": [72]}, "there are 72 trials"),
         ({"do": "trials", "trials": [-1], "sensors": [1]}, "there are 72 trials"),
-        ({"do": "trials", "trials": [0], "name": "build"}, "no build of this project recognises"),
+        ({"do": "trials", "trials": [0], "id": "0123456789ab"}, "the project has no build '0123456789ab'"),
         ({"do": "edit", "trials": [0], "name": "cup"}, "the recordings have changed"),
         ({"do": "edit", "trials": [0], "name": "spoon", "id": "it"}, "'spoon' is not a grasp type"),
         ({"do": "edit", "trials": [0], "name": "none", "id": "it"}, "'none' is not a grasp type"),
