@@ -1,6 +1,7 @@
 """The page *Compare*: two builds on the same trials and on one hand; and what is exported of a build."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -27,7 +28,6 @@ def add_compare_page(studio: Studio) -> None:
     """Add the page *Compare* to a studio."""
     requests: dict[str, Handler] = {
         "compare": partial(_later, studio),
-        "comparison": partial(_comparison, studio),
         "commands": partial(_commands, studio),
         **dict.fromkeys(("report", "firmware"), partial(_queue, studio)),
     }
@@ -36,25 +36,16 @@ def add_compare_page(studio: Studio) -> None:
 
 
 def _chosen(studio: Studio, asked: Asked) -> tuple[list[Path], list[Path]]:
-    """Return two builds, and sets, or all in use. Raises SettingError for other ids, and without a set."""
-    if len(asked.ids) < 2 or asked.ids[0] == asked.ids[1]:
-        raise SettingError("choose two builds to compare")
-    sets = [studio.project.path("set", member) for member in asked.ids[2:]] or studio.project.sets()
-    if not sets:
-        raise SettingError("the project has no recordings in use, on which builds could be compared")
-    return [studio.project.path("build", member) for member in asked.ids[:2]], sets
+    """Return two builds and sets. Raises SettingError for other ids."""
+    if len(asked.ids) < 3 or asked.ids[0] == asked.ids[1]:
+        raise SettingError("choose two builds to compare, and recordings on which to compare them")
+    builds = [studio.project.path("build", member) for member in asked.ids[:2]]
+    return builds, [studio.project.path("set", member) for member in asked.ids[2:]]
 
 
 def _later(studio: Studio, asked: Asked) -> None:
     builds, sets = _chosen(studio, asked)
     studio.queue("compare", partial(_compare, studio, asked.ids, builds, sets))
-
-
-def _comparison(studio: Studio, asked: Asked) -> bytes:
-    """Return the command that compares two builds."""
-    builds, sets = _chosen(studio, asked)
-    first, recordings = studio.project.joined(sets)
-    return message("comparison", command=f"{first}{join(['thenar', 'compare', *map(str, builds)])} {recordings}")
 
 
 def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Sequence[Path], report: Report) -> None:
@@ -106,11 +97,16 @@ def _places(project: Project, asked: Asked) -> tuple[Path, Path, Path]:
 
 
 def _commands(studio: Studio, asked: Asked) -> bytes:
-    """Return the commands that export what the buttons do."""
+    """Return the commands that do what the buttons do; "" for what cannot be done."""
     build, page, folder = _places(studio.project, asked)
     firmware = ["thenar", "firmware", str(build), "--target", asked.name, "-o", str(folder)]
     report = ["cp", str(build / REPORT_NAME), str(page)] if (build / REPORT_NAME).exists() else []
-    return message("commands", report=join(report), firmware=join(firmware))
+    compare = ""
+    with suppress(SettingError):
+        builds, sets = _chosen(studio, asked)
+        first, recordings = studio.project.joined(sets)
+        compare = f"{first}{join(['thenar', 'compare', *map(str, builds)])} {recordings}"
+    return message("commands", report=join(report), firmware=join(firmware), compare=compare)
 
 
 def _queue(studio: Studio, asked: Asked) -> None:

@@ -131,7 +131,7 @@ class RecordPage:
             raise SettingError(types.unknown(unknown[0]))
         tasks = tuple(task for task in tasks if not asked.ids or task.grasp in (*asked.ids, NONE))
         collection = Collection(asked.name, types.name, types.types, tasks, int(repetitions), secrets.randbits(32))
-        self._start("recording", self._project.new_path(asked.name, ".mcap", ".grasps"), collection)
+        self._start(self._project.new_path(asked.name, ".mcap", ".grasps"), collection)
         if asked.name != self._project.state.wearer:
             self._project.remember(wearer=asked.name)
             self._studio.changed()
@@ -146,7 +146,7 @@ class RecordPage:
 
     def _continue(self, asked: Asked) -> None:
         journal = read_journal(self._project.path("recording", asked.id))
-        self._start("recording", journal.path, _collection(journal), journal)
+        self._start(journal.path, _collection(journal), journal)
 
     def _wear(self, asked: Asked) -> None:
         """Begin to record two trials of each type of the build, or three if `name` is a type to add; or go on."""
@@ -160,15 +160,15 @@ class RecordPage:
         wanted = Collection(wearer, types.name, types.types, tasks, often, drawn, checksum)
         for _, path, begun, _, _ in self._unfinished():
             if replace(begun, seed=drawn) == wanted:
-                self._start("wearer", path, begun, read_journal(path))
+                self._start(path, begun, read_journal(path))
                 return
-        self._start("wearer", self._project.new_path(wearer, ".mcap", ".grasps"), wanted)
+        self._start(self._project.new_path(wearer, ".mcap", ".grasps"), wanted)
 
     # A collection, on the thread of the station.
 
-    def _start(self, doing: str, recording: Path, collection: Collection, journal: Journal | None = None) -> None:
-        sitting = Sitting(self._studio, doing, recording, collection, journal)
-        self._studio.station.start(doing, partial(self._lead, sitting), KEYS)
+    def _start(self, recording: Path, collection: Collection, journal: Journal | None = None) -> None:
+        sitting = Sitting(self._studio, recording, collection, journal)
+        self._studio.station.start("recording", partial(self._lead, sitting), KEYS)
 
     def _lead(self, sitting: "Sitting", stop: Event) -> None:
         """Lead a collection, and write the set of all its accepted trials when it ends."""
@@ -191,10 +191,9 @@ class RecordPage:
         codings = None if build is None else build[1].manifest.codings
         grasp_set, report = import_recordings([sitting.recording], codings=codings)
         grasp_set.save(sitting.output)
-        if sitting.doing == "recording":
-            warnings = [finding.message for finding in report.warnings]
-            about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
-            self._studio.publish("finished", message("finished", about, done=done, total=total))
+        warnings = [finding.message for finding in report.warnings]
+        about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
+        self._studio.publish("finished", message("finished", about, done=done, total=total))
         if build is not None and done == total and collection.subject == self._project.state.wearer:
             self._studio.queue("adapt", partial(self._wearer.adapt, [sitting.output]))
 
@@ -208,8 +207,6 @@ class Sitting:
     ----------
     studio : Studio
         The studio that leads it.
-    doing : str
-        "recording" or "wearer".
     recording : Path
         Its file.
     collection, journal
@@ -228,12 +225,10 @@ class Sitting:
         If there are too many trials.
     """
 
-    def __init__(
-        self, studio: Studio, doing: str, recording: Path, collection: Collection, journal: Journal | None
-    ) -> None:
+    def __init__(self, studio: Studio, recording: Path, collection: Collection, journal: Journal | None) -> None:
         self._studio, self._project = studio, studio.project
-        self.doing, self.recording, self.collection, self._journal = doing, recording, collection, journal
-        self.output = recording.with_suffix(".grasps")
+        self.recording, self.collection, self._journal = recording, collection, journal
+        self.output, self._adapts = recording.with_suffix(".grasps"), bool(collection.build)
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
         # The frames of captured trials; the accepted trials, after the first view, and what records them; and of the
@@ -245,7 +240,7 @@ class Sitting:
 
     def lead(self, stop: Event) -> int:
         """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
-        self._studio.publish("collecting", message("collecting", stage="waiting", doing=self.doing))
+        self._studio.publish("collecting", message("collecting", stage="waiting", adapts=self._adapts))
         # Those of the collection before are no longer shown.
         self._studio.publish("trials", message("trials", set="", trials=(), types=(), accuracy=None))
         if self._journal is not None:
@@ -268,7 +263,7 @@ class Sitting:
             self._shown = guide.step, now
             prompt, thing = task(guide, self._taxonomy)
             content = {
-                "doing": self.doing,
+                "adapts": self._adapts,
                 "stage": guide.stage,
                 "number": guide.done + guide.skipped + 1,
                 "grasp": "" if guide.trial is None else guide.trial.grasp,

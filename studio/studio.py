@@ -37,12 +37,6 @@ _MOST_QUEUED = 8
 _LOOK_S = 0.2
 # What is said of devices is old after this time.
 _LASTS_S = 2.0
-# What ends what else uses the glove; a recording is only ended on its page.
-_WATCHING = ("watching", "looking", "calibrating")
-_ENDED_BY: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys((*_WATCHING, "live"), _WATCHING),
-    **dict.fromkeys(("recording", "wearer"), (*_WATCHING, "live")),
-}
 Report = Callable[[int, int], None]
 
 _log = logging.getLogger("thenar")
@@ -246,10 +240,10 @@ class Station:
         """End what uses the glove, and then start this: `work` gets an event that is set when it is to end.
 
         It takes these `keys`, which pages press. Returns at once: a device may take seconds to end. Raises SettingError
-        if the glove is used for something that this may not end.
+        during a recording, which is only ended on its page.
         """
-        if self.doing and self.doing not in _ENDED_BY[doing]:
-            raise SettingError(f"the glove is in use: {self.doing}; end that first")
+        if self.doing == "recording":
+            raise SettingError("the glove is in use: recording; end that first")
         self._stop.set()
         self._stop, self.doing = Event(), doing
         self._keys, self._pressed = tuple(keys), SimpleQueue()

@@ -9,10 +9,7 @@ import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 const SIGNS = { both: "M0-4L4 0L0 4L-4 0Z", a: "M-4-3H4L0 4Z", b: "M-4 3H4L0-4Z" };
 
 const ask = openPage({
-  open: () => {
-    commands();
-    comparison();
-  },
+  open: () => commands(),
   project: ({ builds, sets, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
@@ -20,19 +17,17 @@ const ask = openPage({
     $("no-build").hidden = builds.length > 0;
     // They are compared on all sets unless some are unticked.
     listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name, checked: !state.aside.includes(name) })), changed);
-    $("report").disabled = $("firmware").disabled = !builds.length;
+    $("compare").disabled = $("report").disabled = $("firmware").disabled = !builds.length;
     commands();
-    comparison();
   },
   targets: ({ targets }) => {
     fillMenu($("target"), targets.map(([id, help]) => ({ id, name: `${id}: ${help}` })), targets[0][0]);
     commands();
   },
-  commands: ({ report, firmware }) => {
-    say($("report-command"), report);
-    say($("firmware-command"), firmware);
+  commands: (commands) => {
+    for (const what of ["compare", "report", "firmware"]) say($(`${what}-command`), commands[what]);
+    $("compare").disabled = !commands.compare;
   },
-  comparison: ({ command }) => say($("compare-command"), command),
   compare: (compared) => {
     if (String(compared.ids) === String(request())) show(compared);
   },
@@ -49,15 +44,9 @@ const ask = openPage({
 
 const request = () => [$("a").value, $("b").value, ...ticked($("sets"))];
 
-/** Ask for the command that compares; what was compared before is another matter. */
-function comparison() {
-  $("compare").disabled = request().length < 3 || $("a").value === $("b").value;
-  say($("compare-command"), "");
-  if (!$("compare").disabled) ask("comparison", { ids: request() });
-}
-
+/** Ask for the commands that do what the buttons do. */
 function commands() {
-  if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value });
+  if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value, ids: request() });
 }
 
 const scan = (us) => (us === null ? "unknown" : us ? `${us.toFixed(0)} µs` : "none is read");
@@ -116,9 +105,10 @@ function overlay(hand, kept, builds) {
   $("legend").replaceChildren(...entries);
 }
 
+/** What was compared before is another matter. */
 function changed() {
   $("result").hidden = true;
-  comparison();
+  commands();
 }
 
 for (const id of ["a", "b"]) $(id).addEventListener("change", changed);

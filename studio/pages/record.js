@@ -12,7 +12,7 @@ const query = new URLSearchParams(location.search);
 const only = query.getAll("type"); // types of which the page Errors asks for more; none: all are recorded
 
 let stage = "over";
-let doing = ""; // what the collection is for
+let adapts = false; // whether a build is adapted to the collection
 let sensors = 0; // of the project's set, for Train
 let drawn = null; // the message on the glove's hand
 let hand = null;
@@ -98,9 +98,9 @@ function show(state) {
   const before = stage;
   stage = state.stage;
   const over = stage === "over";
-  // It was begun on the page Wearer, which adapts a build to the trials.
-  if (over && doing === "wearer") location.href = "wearer.html";
-  doing = state.doing;
+  // The page Wearer shows what becomes of the build.
+  if (over && adapts) location.href = "wearer.html";
+  adapts = state.adapts;
   $("begin").hidden = !over;
   $("leading").hidden = over;
   if (over) return;

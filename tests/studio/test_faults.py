@@ -147,7 +147,7 @@ def test_a_station_waits_for_no_device_and_a_recording_is_ended_by_nobody() -> N
     assert not recorded.is_set()
     slow.set()
     assert recorded.wait(PATIENCE_S)
-    for other in ("watching", "calibrating", "live", "recording", "wearer"):
+    for other in ("watching", "calibrating", "live", "recording"):
         with pytest.raises(SettingError, match="in use: recording"):
             station.start(other, watch)
     station.close()
@@ -214,9 +214,9 @@ def glove(line: LineServer) -> str:
     return f'name = "bench"\n[[stream]]\n{stream}'
 
 
-def lead(live: ClientConnection, board: BoardSender, done: int, doing: str) -> None:
+def lead(live: ClientConnection, board: BoardSender, done: int, *, adapts: bool) -> None:
     """Accept trials of a collection that begins, until so many are done."""
-    told, step = until(live, lambda told: told["topic"] == "collecting" and told.get("doing") == doing), ""
+    told, step = until(live, lambda told: told["topic"] == "collecting" and told.get("adapts") == adapts), ""
     while told.get("done", 0) < done:
         before, step = step, str([told.get(name) for name in ("stage", "number", "done")])
         board.show(CLOSED.get(told.get("prompt", ""), {}))
@@ -254,7 +254,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
     opened = studio(None)
     with page(opened.server.url, "collecting,station,adapted,recordings") as live:
         live.send(json.dumps({"do": "wear"}))
-        lead(live, board[1], 1, "wearer")
+        lead(live, board[1], 1, adapts=True)
         leave(live)
         assert len(read_journal(folder / "me.mcap").accepted) == 1
         assert GraspSet.load(folder / "me.grasps").joints == (coding,)
@@ -263,7 +263,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         assert "begun with a different value of build" in " ".join(capsys.readouterr().err.split())
         (member,) = opened.project.members("recording")
         live.send(json.dumps({"do": "continue", "id": member.id}))
-        lead(live, board[1], 4, "recording")
+        lead(live, board[1], 4, adapts=True)
         leave(live)
         assert until(live, lambda told: told["topic"] == "adapted")["folder"] == "me"
     assert GraspSet.load(folder / "me.grasps").joints == (coding,)
@@ -282,7 +282,7 @@ def test_what_was_recorded_and_edited_outlives_the_studio(
         url = process.stderr.readline().rpartition(" ")[2].strip()
         with page(url, "collecting,station") as live:
             live.send(json.dumps({"do": "record", "name": "A", "id": "own", "names": TYPES, "value": 2}))
-            lead(live, board[1], 1, "recording")
+            lead(live, board[1], 1, adapts=False)
             with page(url, "trials,edits") as strip:
                 ((trial, grasp, _),) = until(strip, lambda told: bool(told.get("trials")))["trials"]
                 other = next(name for name in TYPES if name != grasp)
