@@ -8,7 +8,6 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from shlex import quote
 from typing import Any
 
 import msgspec
@@ -31,7 +30,7 @@ from thenar.runtime.web.server import message
 
 from .quick import QuickAccuracy
 from .sensors import placed, scan_time_us
-from .studio import Asked, Handler, Report, Studio
+from .studio import Asked, Handler, Job, Report, Studio
 
 _BUILD = "build"
 
@@ -83,7 +82,7 @@ class ChoosePage:
             "add": lambda asked: self._found("add", asked.sensors),
             "drop": lambda asked: self._found("drop", asked.sensors),
             "use": self._use,
-            **dict.fromkeys(("measure", "curve", "train"), self._later),
+            **dict.fromkeys(("measure", "curve", "train"), self._job),
         }
         studio.add(requests, self.read)
 
@@ -141,11 +140,11 @@ class ChoosePage:
         self._project.remember(aside=tuple(sorted(aside - {name} if asked.value else aside | {name})))
         self._studio.changed()
 
-    def _later(self, asked: Asked) -> None:
+    def _job(self, asked: Asked) -> Job:
         if asked.do != "curve" and not asked.sensors:
             raise ThenarError("choose a sensor first: without any, nothing can be learnt")
         names = self.recordings.names(asked.sensors)
-        self._studio.queue(asked.do, partial(self._measure, asked, names))
+        return partial(self._measure, asked, names)
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
         now = self.recordings
@@ -163,13 +162,12 @@ class ChoosePage:
         """Return the commands that compile a build of these sensors from these sets."""
         if not names:
             return ""
-        first, recordings = self._project.joined([self._project.folder / name for name in files])
-        have, more = quote(",".join(names)), "".join(f" {quote(option)}" for option in self._project.options())
-        output = quote(str(self._project.new_path(_BUILD)))
-        return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
+        more: list[object] = ["-o", self._project.new_path(_BUILD), *self._project.options()]
+        more += ["--sensors", len(names), "--have", ",".join(names)]
+        return self._project.command(["compile"], [self._project.folder / name for name in files], more)
 
-    def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> None:
-        """Measure the curve, or the accuracy of chosen sensors, or train a build of these; tell all pages.
+    def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> dict[str, object]:
+        """Measure the curve, or the accuracy of chosen sensors, or train a build of these.
 
         Raises ThenarError if their numbers mean other sensors by now.
         """
@@ -182,15 +180,14 @@ class ChoosePage:
             output = self._project.new_path(_BUILD)
             documents = Documents(now.hand, parts=now.parts)
             built = compile_build(now.grasp_set, output, recipe, documents=documents, progress=report, **many)
-            content: dict[str, Any] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
+            content: dict[str, object] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
             self._project.remember(build=output.name)
             self._studio.changed()
         else:
             limits = Limits.of(recipe, now.grasp_set, {}, prices=now.prices)
             study = study_sensors(now.grasp_set, recipe, limits=limits, report=report, **many)
             content = _content(study, now.quick.names)
-        content |= {"sensors": asked.sensors, "numbering": now.numbering}
-        self._studio.publish(asked.do, message(asked.do, content))
+        return content | {"sensors": asked.sensors, "numbering": now.numbering}
 
 
 def _levels(grasp_set: GraspSet) -> dict[str, str]:

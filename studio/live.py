@@ -51,7 +51,7 @@ class StudioLive:
         members = [member for kind in ("recording", "build") for member in project.members(kind)]
         paths = {member.id: quote(str(project.folder / member.name)) for member in members}
         why, built = self._lacking(), project.build()
-        run = "" if built is None else f"thenar run {quote(str(built[0]))} --glove {quote(str(project.harness))} --web"
+        run = "" if built is None else project.command(["run", built[0], "--glove", project.harness, "--web"])
         self._studio.publish("live", message("live", paths=paths, run=run, why=why, unread=self._unread))
 
     def _lacking(self) -> str:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from shlex import join, quote
+from shlex import join
 
 import msgspec
 
@@ -115,10 +115,6 @@ class Project:
         """Return the sets in use."""
         return [self.folder / one.name for one in self.members("set") if one.name not in self.state.aside]
 
-    def grasp_set(self) -> GraspSet:
-        """Return the recordings: all sets in use as one, with their edits. Raises ThenarError if there is none."""
-        return self.recordings()[0]
-
     def recordings(self, paths: Sequence[Path] = ()) -> tuple[GraspSet, list[TrialId], list[str]]:
         """Return these sets, or all in use, as one; and for each of its rows the trial as it was recorded.
 
@@ -151,16 +147,18 @@ class Project:
         """The path of the log of edits, which may not be there."""
         return self.folder / "edits.jsonl"
 
-    def joined(self, paths: Sequence[Path]) -> tuple[str, str]:
-        """Return the beginning of a command that makes one set of several and of edits, and the name of the result; if
-        there is nothing to do, "" and the name of the only set.
+    def command(self, words: Sequence[object], sets: Sequence[Path] = (), more: Sequence[object] = ()) -> str:
+        """Return a command of thenar: its first `words`, the sets, and `more`.
+
+        Several sets, and edits of one, are merged by a command before it.
         """
-        if len(paths) == 1 and not self.edits.exists():
-            return "", quote(str(paths[0]))
-        # Next to the project: in it, it would be one more set.
-        whole = str(self.folder.resolve().parent / f"{self.name}.grasps")
-        edits = ["--edits", str(self.edits)] if self.edits.exists() else []
-        return f"{join(['thenar', 'merge', *map(str, paths), *edits, '-o', whole])} && ", quote(whole)
+        first, given = "", [*sets]
+        if sets and (len(sets) > 1 or self.edits.exists()):
+            # Next to the project: in it, it would be one more set.
+            given = [self.folder.resolve().parent / f"{self.name}.grasps"]
+            edits = ["--edits", self.edits] if self.edits.exists() else []
+            first = f"{self.command(['merge', *sets, *edits, '-o', *given])} && "
+        return first + join(map(str, ["thenar", *words, *given, *more]))
 
     @property
     def harness(self) -> Path:

@@ -2,7 +2,8 @@
 
 A page asks with a message: `do` names the request, other fields its values. A request is carried out on the server's
 thread if it takes milliseconds. Longer work is queued and done one at a time, by `run`; its progress is the topic
-"work". The devices of the glove have one user at a time, whose thread the `Station` keeps.
+"work", its result that of the request's name. The devices of the glove have one user at a time, whose thread the
+`Station` keeps.
 """
 
 import logging
@@ -37,7 +38,9 @@ _MOST_QUEUED = 8
 _LOOK_S = 0.2
 # What is said of devices is old after this time.
 _LASTS_S = 2.0
+# How far work is: how much is done, and of how much. Work that was asked for returns the fields of its result.
 Report = Callable[[int, int], None]
+Job = Callable[[Report], Mapping[str, object] | None]
 
 _log = logging.getLogger("thenar")
 
@@ -63,7 +66,8 @@ class Asked(msgspec.Struct, frozen=True):
     numbers: tuple[int, ...] = ()
 
 
-Handler = Callable[[Asked], bytes | None]
+# What carries out a request returns a reply to the page, or work to queue, whose result all pages get.
+Handler = Callable[[Asked], bytes | Job | None]
 
 
 class Studio(Closing):
@@ -102,7 +106,7 @@ class Studio(Closing):
             "key": lambda asked: self.station.press(asked.name),
         }
         self._readers = list[Callable[[Report], None]]()
-        self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
+        self._queue = SimpleQueue[tuple[str, Job]]()
         self._stale = False
         self._began_s, self._cancelled = 0.0, False
         self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
@@ -121,8 +125,8 @@ class Studio(Closing):
         """Make this the newest message of its topic."""
         self.server.publish(topic, made)
 
-    def queue(self, what: str, work: Callable[[Report], None]) -> None:
-        """Do this later: `work` gets a function that takes how much is done, and of how much.
+    def queue(self, what: str, work: Job) -> None:
+        """Do this later, and publish its result as the message `what`.
 
         Raises ThenarError if too much waits already.
         """
@@ -169,7 +173,9 @@ class Studio(Closing):
             self._began_s, self._cancelled = monotonic(), False
             try:
                 report(0, 1)
-                work(report)
+                made = work(report)
+                if made is not None:
+                    self.publish(what, message(what, made))
                 self.publish("work", message("work", done=1, total=1, what=what))
                 if what != "reading":
                     took = round(monotonic() - self._began_s, 1)
@@ -215,9 +221,13 @@ class Studio(Closing):
         if handler is None:
             raise ThenarError(f"a page cannot {asked.do[:20]!r}")
         try:
-            return handler(asked)
+            made = handler(asked)
         except OSError as reason:  # the folder is read-only, full or gone
             raise ThenarError(str(reason)) from None
+        if not callable(made):
+            return made
+        self.queue(asked.do, made)
+        return None
 
 
 class Station:

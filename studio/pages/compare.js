@@ -31,15 +31,8 @@ const ask = openPage({
   compare: (compared) => {
     if (String(compared.ids) === String(request())) show(compared);
   },
-  exported: ({ said, address, name }) => {
-    say($("exported"), said);
-    $("download").hidden = false;
-    const link = $("download").firstChild;
-    link.href = address;
-    link.download = name;
-    say(link, `Save ${name}`);
-    commands();
-  },
+  report: (made) => exported(made),
+  firmware: (made) => exported(made),
 });
 
 const request = () => [$("a").value, $("b").value, ...ticked($("sets"))];
@@ -47,6 +40,16 @@ const request = () => [$("a").value, $("b").value, ...ticked($("sets"))];
 /** Ask for the commands that do what the buttons do. */
 function commands() {
   if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value, ids: request() });
+}
+
+function exported({ said, address, name }) {
+  say($("exported"), said);
+  $("download").hidden = false;
+  const link = $("download").firstChild;
+  link.href = address;
+  link.download = name;
+  say(link, `Save ${name}`);
+  commands();
 }
 
 const scan = (us) => (us === null ? "unknown" : us ? `${us.toFixed(0)} µs` : "none is read");

@@ -26,7 +26,7 @@ const ask = openPage({
     list($("notes"), notes);
     say($("adapt-command"), command);
   },
-  adapted: (result) => {
+  adapt: (result) => {
     $("result").hidden = false;
     say($("result-heading"), `Adapted: ${result.folder}, from ${result.total} trials`);
     say($("before"), result.before);

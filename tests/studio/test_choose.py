@@ -298,7 +298,9 @@ def test_the_command_applies_the_edits_and_can_be_run(studio: Start, people: Gra
     assert run(merge.split()[1:]) == 0
     clean = GraspSet.load(tmp_path / "recorded.grasps")
     assert (
-        clean.fingerprint() == opened.project.grasp_set().fingerprint() == people.rows(np.arange(5, 72)).fingerprint()
+        clean.fingerprint()
+        == opened.project.recordings()[0].fingerprint()
+        == people.rows(np.arange(5, 72)).fingerprint()
     )
 
 

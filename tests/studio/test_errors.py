@@ -251,7 +251,7 @@ def test_trials_are_relabelled_left_out_and_taken_back(browser: Browser, studio:
     edits = read_edits(folder / "edits.jsonl")[0]
     assert [edit.action for edit in edits] == [1] + [2] * (several - 1)
     assert (edits[0].old, edits[0].new, {edit.new for edit in edits[1:]}) == (truth, read, {""})
-    assert len(Project(folder, opened.project.hand()).grasp_set()) == 72 - several + 1
+    assert len(Project(folder, opened.project.hand()).recordings()[0]) == 72 - several + 1
     browser.click("undo")
     browser.wait(lambda: browser.text("edited").endswith(f"made {read}."))
     browser.click("undo")

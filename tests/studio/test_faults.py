@@ -73,13 +73,13 @@ def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(
     people.rows(people.subjects == "C").save(folder / "C.grasps")
     (folder / "half.grasps").write_bytes(b"half")
     (folder / "few" / "build.json").write_bytes(b"{")
-    with page(studio(None).server.url, "wearing,adapted") as live:
+    with page(studio(None).server.url, "wearing,adapt") as live:
         shown = until(live, lambda told: bool(told["sets"]))
         assert [one["name"] for one in shown["sets"]] == ["C.grasps"]
         live.send(json.dumps({"do": "adapt", "ids": [one["id"] for one in shown["sets"]]}))
         # The two may come in either order.
-        told = [until(live, lambda told: told["topic"] == "adapted" or told.get("build") == "C") for _ in range(2)]
-        assert {one["topic"]: one.get("folder") or one["base"] for one in told} == {"adapted": "C", "wearing": "more"}
+        told = [until(live, lambda told: told["topic"] == "adapt" or told.get("build") == "C") for _ in range(2)]
+        assert {one["topic"]: one.get("folder") or one["base"] for one in told} == {"adapt": "C", "wearing": "more"}
 
 
 def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:
@@ -252,7 +252,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
     (folder / "glove.toml").write_text(glove(board[0]))
     Project(folder, hand).remember(build="build")
     opened = studio(None)
-    with page(opened.server.url, "collecting,station,adapted,recordings") as live:
+    with page(opened.server.url, "collecting,station,adapt,recordings") as live:
         live.send(json.dumps({"do": "wear"}))
         lead(live, board[1], 1, adapts=True)
         leave(live)
@@ -265,7 +265,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         live.send(json.dumps({"do": "continue", "id": member.id}))
         lead(live, board[1], 4, adapts=True)
         leave(live)
-        assert until(live, lambda told: told["topic"] == "adapted")["folder"] == "me"
+        assert until(live, lambda told: told["topic"] == "adapt")["folder"] == "me"
     assert GraspSet.load(folder / "me.grasps").joints == (coding,)
     assert Build.load(folder / "me").manifest.adapted is not None
 

@@ -168,12 +168,12 @@ def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
     browser.click("drop")
     browser.wait(lambda: "left out" in browser.texts("#strip button")[0])
     project = Project(folder, page.project.hand())
-    assert len(project.grasp_set().rows(project.grasp_set().grasps == grasp)) == 1
+    assert len(project.recordings()[0].rows(project.recordings()[0].grasps == grasp)) == 1
     browser.picture("record-end")
     for _ in range(2):
         browser.click("undo")
     browser.wait(lambda: browser.texts("#strip button") == strip)
-    assert len(project.grasp_set()) == 6
+    assert len(project.recordings()[0]) == 6
     browser.wait(lambda: not browser.script("return document.getElementById('train').disabled"))
     browser.click("train")
     browser.wait(lambda: browser.text("build-heading") == "Trained: build")
