@@ -4,7 +4,7 @@ Each is appended, also an undo, which edits the trials back; the recordings stay
 """
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Lock
@@ -53,15 +53,14 @@ def undo(path: Path) -> None:
         _append(path, edits, [(edit.of, edit.new, edit.old) for edit in last], last[0].action)
 
 
-def restore(path: Path, trials: Iterable[TrialId]) -> bool:
-    """Take back what became of trials, which were recorded in vain, and return whether there was anything.
+def restore(path: Path, name: str, kept: Container[int]) -> bool:
+    """Take back what became of the trials of the set `name` whose numbers are not `kept`; return whether any was edited.
 
-    The actions cannot be undone any more. Raises RecordingError for a damaged log, and OSError.
+    Their actions cannot be undone any more. Raises RecordingError for a damaged log, and OSError.
     """
     with _WRITING:
-        edits = load_edits(path)[0]
-        latest = {edit.of: edit for edit in edits}
-        found = [latest[trial] for trial in trials if trial in latest and latest[trial].new != trial[3]]
+        latest = {edit.of: edit for edit in load_edits(path)[0] if edit.set == name and edit.trial not in kept}
+        found = [edit for edit in latest.values() if edit.new != edit.grasp]
         for edit in found:
             _append(path, load_edits(path)[0], [(edit.of, edit.new, edit.grasp)], edit.action)
         return bool(found)
@@ -83,7 +82,7 @@ def edits_message(path: Path) -> bytes:
     last, latest = last_action(edits), {edit.of: edit for edit in edits}
     what = counted(len(last), "trial") if len(last) > 1 else named(last[0].of) if last else ""
     done = f"{what} {f'made {last[0].new}' if last[0].new else 'left out'}" if last else ""
-    made = [(one.new, one.set, one.trial, one.grasp, one.object) for one in latest.values() if one.new != one.grasp]
+    made = [(edit.new, edit.set, edit.trial) for edit in latest.values() if edit.new != edit.grasp]
     return message("edits", words=done, made=made)
 
 

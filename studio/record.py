@@ -201,7 +201,8 @@ class RecordPage:
 class Sitting:
     """A collection that is led, and its accepted trials, which can be looked at and edited meanwhile and afterwards.
 
-    The log of edits names a trial as the set does that is written at the end, so an edit waits for that.
+    The log of edits names a trial as the set does that is written at the end, so an edit waits for that. What became of
+    a trial that is undone is taken back.
 
     Parameters
     ----------
@@ -258,6 +259,10 @@ class Sitting:
                 self._captured[guide.trial.number] = guide.captured
             if self._session is None or guide.accepted != self._accepted:
                 self._session, self._accepted = guide.session, guide.accepted
+                # What is wrong with the log is said by Choose, and ends no recording.
+                with suppress(ThenarError, OSError):
+                    if restore(self._project.edits, self.output.name, {*self._accepted}):
+                        self._studio.changed()
                 self.tell()
         if step != guide.step or now >= shown_us + _SHOW_US:
             self._shown = guide.step, now
@@ -285,25 +290,16 @@ class Sitting:
         with self._telling:
             if self._session is None:
                 return
-            trials, made = [self.trials[number] for number in self._accepted], self._made()
+            trials, made = [self.trials[number] for number in self._accepted], dict[int, str]()
+            with suppress(ThenarError, OSError):
+                edits = load_edits(self._project.edits)[0]
+                made = {edit.trial: edit.new for edit in edits if edit.set == self.output.name}
             shown = [(trial.number, trial.grasp, trial.object) for trial in trials]
             types = list(dict.fromkeys(trial.grasp for trial in self.trials.values()))
             edited = [(trial, made.get(trial.number, trial.grasp)) for trial in trials]
             accuracy = self._accuracy(self._session, [one for one in edited if one[1] not in ("", NONE)])
             about = {"set": self.output.name, "trials": shown, "types": types, "accuracy": accuracy}
             self._studio.publish("trials", message("trials", about))
-
-    def _made(self) -> dict[int, str]:
-        """Return what accepted trials were made, by their numbers; edits of those that were undone are taken back."""
-        numbers = {self._id(trial): trial.number for trial in self.trials.values()}
-        # What is wrong with the log is said by Choose, and ends no recording.
-        with suppress(ThenarError, OSError):
-            made = {edit.of: edit.new for edit in load_edits(self._project.edits)[0] if edit.of in numbers}
-            undone = [trial for trial in made if numbers[trial] not in self._accepted]
-            if restore(self._project.edits, undone):
-                self._studio.changed()
-            return {numbers[trial]: new for trial, new in made.items()}
-        return {}
 
     def _id(self, trial: Trial) -> TrialId:
         """Return what the log calls a trial: as `import_recordings` does, which makes one session."""

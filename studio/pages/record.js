@@ -20,7 +20,7 @@ let pictured = null; // the grasp type that is drawn
 let listed = false; // whether the project has an objects.toml
 let shown = { set: "", trials: [] }; // the message on the trials so far
 let seen = null; // the number of the trial that is shown
-let edits = new Map(); // what trials were made, by set, number, type and object; "": left out
+let edits = new Map(); // what trials were made, by set and number; "": left out
 let edited = false; // whether the person's name was typed here
 
 const ask = openPage({
@@ -168,8 +168,8 @@ function showTrials(message) {
 
 /** Say what became of the trials. */
 function markTrials() {
-  shown.trials.forEach((trial, at) => {
-    const change = edits.get(String([shown.set, ...trial]));
+  shown.trials.forEach(([trial], at) => {
+    const change = edits.get(String([shown.set, trial]));
     say($("strip").children[at].firstChild.lastChild, change === undefined ? "" : change ? ` → ${change}` : ", left out");
   });
 }

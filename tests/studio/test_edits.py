@@ -120,19 +120,20 @@ def test_a_trial_that_would_become_another_gets_a_free_number(tmp_path: Path) ->
 
 
 def test_a_trial_that_is_recorded_anew_is_as_recorded_and_its_edit_is_not_undone(tmp_path: Path) -> None:
-    log, (cup, pen, rod) = tmp_path / "edits.jsonl", trials_of("a.grasps", clashing())
-    assert not restore(log, [cup])
-    change(log, [pen], "")
-    for new in ("pen", "rod"):
-        change(log, [cup], new)
-    assert restore(log, [cup, rod])
-    assert not restore(log, [cup, rod])
+    log, one = tmp_path / "edits.jsonl", replace(clashing(), trials=np.repeat([1, 2, 3], 2))
+    cup, pen, _ = trials_of("a.grasps", one)
+    other = ("b.grasps", *cup[1:])
+    assert not restore(log, "a.grasps", ())
+    for trial, new in ((pen, ""), (other, "rod"), (cup, "pen"), (cup, "rod")):
+        change(log, [trial], new)
+    assert restore(log, "a.grasps", {2, 3})
+    assert not restore(log, "a.grasps", {2, 3})
     latest = {edit.of: edit.new for edit in read_edits(log)[0]}
-    assert latest == {cup: "cup", pen: ""}
+    assert latest == {cup: "cup", pen: "", other: "rod"}
     # Of the two actions on it the first is left, and takes nothing away.
-    undo(log)
-    undo(log)
-    assert {edit.of: edit.new for edit in read_edits(log)[0]} == {cup: "cup", pen: "pen"}
+    for _ in range(3):
+        undo(log)
+    assert {edit.of: edit.new for edit in read_edits(log)[0]} == {cup: "cup", pen: "pen", other: "cup"}
     with pytest.raises(SettingError, match="nothing to undo"):
         undo(log)
 
