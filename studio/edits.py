@@ -54,7 +54,7 @@ def undo(path: Path) -> None:
 
 
 def restore(path: Path, name: str, kept: Container[int]) -> bool:
-    """Take back what became of the trials of the set `name` whose numbers are not `kept`; return whether any was edited.
+    """Take back what became of the trials of the set `name` with other numbers than `kept`; return whether it was any.
 
     Their actions cannot be undone any more. Raises RecordingError for a damaged log, and OSError.
     """

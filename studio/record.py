@@ -28,9 +28,8 @@ from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.glove import Glove
 from thenar.runtime.published import NONE, DeviceHealth
 from thenar.runtime.recording.guide import KEYS, CollectionGuide, Journal, Key, Trial, planned, read_journal
-from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label, Session
+from thenar.runtime.recording.session import Collection, Label
 from thenar.runtime.web.server import message
 
 from .collecting import collect, standing, task
@@ -222,8 +221,8 @@ class Sitting:
 
     Raises
     ------
-    SettingError
-        If there are too many trials.
+    ThenarError, OSError
+        If there are too many trials, or the glove's files cannot be read.
     """
 
     def __init__(self, studio: Studio, recording: Path, collection: Collection, journal: Journal | None) -> None:
@@ -232,11 +231,11 @@ class Sitting:
         self.output, self._adapts = recording.with_suffix(".grasps"), bool(collection.build)
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
-        # The frames of captured trials; the accepted trials, after the first view, and what records them; and of the
-        # last view the guide's step and the time.
+        self._sensors = GloveSensors(self._project.wiring(), self._project.hand())
+        # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
+        # step and the time.
         self._captured = dict[int, Frames]()
-        self._accepted: Sequence[int] = ()
-        self._session: Session | None = None
+        self._accepted: Sequence[int] | None = None
         self._shown, self._telling = (-1, 0), Lock()
 
     def lead(self, stop: Event) -> int:
@@ -257,8 +256,8 @@ class Sitting:
         if step != guide.step:
             if guide.stage == "review" and guide.trial is not None:
                 self._captured[guide.trial.number] = guide.captured
-            if self._session is None or guide.accepted != self._accepted:
-                self._session, self._accepted = guide.session, guide.accepted
+            if guide.accepted != self._accepted:
+                self._accepted = guide.accepted
                 # What is wrong with the log is said by Choose, and ends no recording.
                 with suppress(ThenarError, OSError):
                     if restore(self._project.edits, self.output.name, {*self._accepted}):
@@ -288,7 +287,7 @@ class Sitting:
     def tell(self) -> None:
         """Show the accepted trials, and how well they are told apart as they were edited."""
         with self._telling:
-            if self._session is None:
+            if self._accepted is None:
                 return
             trials, made = [self.trials[number] for number in self._accepted], dict[int, str]()
             with suppress(ThenarError, OSError):
@@ -297,7 +296,7 @@ class Sitting:
             shown = [(trial.number, trial.grasp, trial.object) for trial in trials]
             types = list(dict.fromkeys(trial.grasp for trial in self.trials.values()))
             edited = [(trial, made.get(trial.number, trial.grasp)) for trial in trials]
-            accuracy = self._accuracy(self._session, [one for one in edited if one[1] not in ("", NONE)])
+            accuracy = self._accuracy([one for one in edited if one[1] not in ("", NONE)])
             about = {"set": self.output.name, "trials": shown, "types": types, "accuracy": accuracy}
             self._studio.publish("trials", message("trials", about))
 
@@ -305,29 +304,26 @@ class Sitting:
         """Return what the log calls a trial: as `import_recordings` does, which makes one session."""
         return self.output.name, self.collection.subject, "1", trial.grasp, trial.object, trial.number
 
-    def _accuracy(self, session: Session, edited: Sequence[tuple[Trial, str]]) -> dict[str, object] | None:
+    def _accuracy(self, edited: Sequence[tuple[Trial, str]]) -> dict[str, object] | None:
         """Return the quick accuracy of all sensors in trials of these types, if there are enough."""
         counts = Counter(grasp for _, grasp in edited)
         types = {*counts, *(trial.grasp for trial in self.trials.values())} - {NONE}
         if len(types) < 2 or any(counts[grasp] < _LEAST for grasp in types):
             return None
-        frames = [self._captured[trial.number] for trial, _ in edited]
-        codes = [() if glove is None else tuple(glove.sensors) for _, glove in frames]
-        taxels = [[] if switches is None else [code or 0 for code in switches.taxels or ()] for switches, _ in frames]
-        closed = [0 if switches is None else switches.closed for switches, _ in frames]
+        rows = [self._sensors.read(*self._captured[trial.number]) for trial, _ in edited]
+        shown, names = np.array([[value or 0 for value in row] for row in rows]), self._sensors.names
+        switches = self._sensors.kinds.count("switch")
         try:
             grasp_set = GraspSet(
-                switches=switch_matrix(closed, len(session.switches)),
-                switch_names=session.switches,
-                codes=np.array(codes, np.uint16).reshape(len(edited), len(session.sensors)),
-                joints=tuple(Joint(name, RAW, 1, 1.0, 255, 255.0) for name in session.sensors),
+                switches=shown[:, :switches] == 1,
+                switch_names=names[:switches],
+                codes=shown[:, switches:].astype(np.uint16),
+                joints=tuple(Joint(name, RAW, 0, 0.0, 1, 1.0) for name in names[switches:]),
                 grasps=np.array([grasp for _, grasp in edited]),
                 taxonomy=self._taxonomy,
                 subjects=np.array(["me"] * len(edited)),
                 objects=np.array([trial.object for trial, _ in edited]),
                 trials=np.array([trial.number for trial, _ in edited]),
-                taxels=np.array(taxels, np.uint16).reshape(len(edited), len(session.taxels)),
-                taxel_columns=tuple(Joint(name, "counts", 0, 0.0, 1, 1.0) for name in session.taxels),
             )
             quick = QuickAccuracy(grasp_set)
             found = quick.of(range(len(quick.names)))
@@ -339,16 +335,15 @@ class Sitting:
         """Return the captured frames of a trial, as the hand shows them. Raises SettingError if there are none."""
         if number not in self._captured:
             raise SettingError(f"trial {number} was not recorded")
-        sensors = GloveSensors(self._project.wiring(), self._project.hand())
-        trial, shown = self.trials[number], sensors.read(*self._captured[number])
-        return message("recorded", sensors.drawn(shown), trial=number, grasp=trial.grasp, thing=trial.object)
+        trial, shown = self.trials[number], self._sensors.read(*self._captured[number])
+        return message("recorded", self._sensors.drawn(shown), trial=number, grasp=trial.grasp, thing=trial.object)
 
     def relabel(self, number: int, new: str) -> None:
         """Make an accepted trial another type; an empty one leaves it out.
 
         Raises SettingError for another trial or type, and as `change` does.
         """
-        if number not in self._accepted:
+        if number not in (self._accepted or ()):
             raise SettingError(f"trial {number} is not among those that were accepted")
         for grasp in filter(None, (self.trials[number].grasp, new)):
             if grasp not in self._taxonomy.types:

@@ -280,6 +280,14 @@ def test_trials_are_edited_while_the_recording_goes_on(
     browser.wait(lambda: strip(browser)[1].endswith("left out"))
     assert "skipped" not in browser.text("place")
     assert not (folder / "Anna.grasps").exists()
+    for asked, why in (
+        ({"do": "recorded", "trial": 99}, "trial 99 was not recorded"),
+        ({"do": "relabel", "trial": 3, "name": "Tip"}, "trial 3 is not among those that were accepted"),
+        ({"do": "relabel", "trial": 1, "name": "spoon"}, "spoon"),
+        ({"do": "relabel", "trial": 1, "name": "none"}, "none"),
+        ({"do": "relabel", "trial": 1, "name": new}, f"are {new} already"),
+    ):
+        assert why in reply(first, asked)["why"]
     browser.driver.find_element(By.TAG_NAME, "body").send_keys("q")
     browser.wait(lambda: browser.text("end-heading") == "Recorded: Anna.grasps")
     assert len(GraspSet.load(folder / "Anna.grasps")) == 2
@@ -343,7 +351,7 @@ def test_it_can_be_used_by_everybody(
         ({"do": "continue", "id": "../glove.toml"}, "the project has no recording"),
         ({"do": "key", "name": "explode"}, "there is no key 'explode' now"),
         ({"do": "key", "name": "accept"}, "there is no key 'accept' now"),
-        ({"do": "recorded", "trial": 99}, "was not recorded"),
+        ({"do": "recorded", "trial": 99}, "nothing was recorded here yet"),
         ({"do": "relabel", "trial": 1, "name": "Tip"}, "nothing was recorded here yet"),
     ],
 )
