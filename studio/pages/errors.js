@@ -144,7 +144,6 @@ function select(trials) {
   $("selected").hidden = !trials.length;
   $("trials").replaceChildren();
   mark();
-  watcher.disconnect();
   if (!trials.length) return;
   const proposed = type(pairOf(trials)[1] ?? reply.truth[trials[0]]);
   $("type").value = set.types.includes(proposed) ? proposed : set.types[0];
@@ -218,31 +217,19 @@ function hand(shown, decisive, words) {
   const joints = set.joints.filter(({ joint }) => used.has(first + joint));
   const switches = drawn.switches.filter(({ bit }) => used.has(bit));
   if (!switches.length && !joints.length) return [];
-  const svg = draw("svg", { role: "img", "aria-label": `hand: ${words}` });
-  // Drawn when it is nearly on the screen: before, it has no width, and thousands would take long.
-  watcher.observe(svg);
-  svg.paint = () => {
-    const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
-    const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
-    const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
-    setClosed(shown.map((share) => share > 0.5));
-    setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
-    const names = decisive.map((sensor) => set.sensors[sensor].name);
-    for (const spot of svg.querySelectorAll(".spot")) {
-      spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
-    }
-    svg.setAttribute("aria-label", `hand: ${words}`);
-  };
+  const svg = draw("svg");
+  const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
+  const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
+  const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
+  setClosed(shown.map((share) => share > 0.5));
+  setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
+  const names = decisive.map((sensor) => set.sensors[sensor].name);
+  for (const spot of svg.querySelectorAll(".spot")) {
+    spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
+  }
+  svg.setAttribute("aria-label", `hand: ${words}`);
   return [svg];
 }
-
-const watcher = new IntersectionObserver((entries) => {
-  for (const { target, isIntersecting } of entries) {
-    if (!isIntersecting) continue;
-    watcher.unobserve(target);
-    target.paint();
-  }
-}, { rootMargin: "300px" });
 
 /* ---- What the page is asked for ---- */
 
