@@ -111,11 +111,11 @@ class ErrorsPage:
 
     def read(self, report: Report) -> None:
         """Offer the builds that can recognise the recordings."""
-        self._readings, held = {}, self._choose.recordings.quick.held
-        builds, unused = list[Member](), list[str]()
+        self._readings, builds, unused = {}, list[Member](), list[str]()
         for member in self._project.members("build"):
             try:
-                select_inputs(held, load_manifest(self._project.folder / member.name))
+                manifest = load_manifest(self._project.folder / member.name)
+                select_inputs(self._choose.recordings.quick.held, manifest)
                 builds.append(member)
             except (ThenarError, OSError) as reason:
                 unused.append(f"build {member.name} is left out: {reason}")

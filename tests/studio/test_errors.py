@@ -467,7 +467,7 @@ def test_every_build_of_the_project_can_be_looked_at(
     assert browser.axe() == []
     (folder / "few" / "tables.bin").write_bytes(b"")
     opened.changed()
-    browser.wait(lambda: "reading" not in browser.text("work"))
+    browser.wait(lambda: errors_of(opened, {"do": "errors", "id": ids["few"]})["topic"] == "refused")
     browser.driver.find_element(By.CSS_SELECTOR, f"#of option[value='{ids['few']}']").click()
     browser.wait(lambda: "tables.bin" in browser.text("refused"))
     assert "build more" in browser.text("about")
