@@ -5,6 +5,7 @@ nested folds and the curve of what sensors are worth take longer. They are queue
 """
 
 import hashlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -28,7 +29,7 @@ from thenar.runtime.hand import DrawnJoint, DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.web.server import message
 
-from .quick import QuickAccuracy
+from .quick import Quick, QuickAccuracy
 from .sensors import placed, scan_time_us
 from .studio import Asked, Handler, Job, Report, Studio
 
@@ -148,11 +149,12 @@ class ChoosePage:
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
         now = self.recordings
-        names = now.names(sensors)
+        names, found = now.names(sensors), now.quick.of(sensors)
         return message(
             "quick",
-            now.quick.of(sensors),
+            found,
             sensors=sensors,
+            weakest=_weakest(now.quick, found),
             scan_us=scan_time_us([now.levels[name] for name in names if name in now.levels]),
             price=sum(now.prices[name] for name in names) if now.parts else None,
             command=self._command(now.files, names),
@@ -188,6 +190,16 @@ class ChoosePage:
             study = study_sensors(now.grasp_set, recipe, limits=limits, report=report, **many)
             content = _content(study, now.quick.names)
         return content | {"sensors": asked.sensors, "numbering": now.numbering}
+
+
+def _weakest(quick: QuickAccuracy, found: Quick) -> str:
+    """Return the two types of which one is recognised as the other most often, in words."""
+    pairs = Counter(pair for pair in zip(quick.truth.tolist(), found.read, strict=True) if pair[0] != pair[1])
+    if not pairs:
+        return "none"
+    truth, read = worst = max(sorted(pairs), key=lambda pair: pairs[pair])
+    total = np.count_nonzero(quick.truth == truth)
+    return f"{quick.grasps[truth]} recognised as {quick.grasps[read]}: {pairs[worst]} of {total} trials"
 
 
 def _levels(grasp_set: GraspSet) -> dict[str, str]:

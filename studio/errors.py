@@ -19,7 +19,7 @@ from thenar.runtime.web.server import message
 from .choose import ChoosePage
 from .edits import change, undo
 from .project import Member
-from .quick import QuickAccuracy, strongest
+from .quick import Quick, QuickAccuracy, strongest
 from .sensors import sensors_read
 from .studio import Asked, Handler, Report, Studio
 
@@ -43,12 +43,10 @@ class BuildReading:
     ----------
     types : list of str
         The types of the recordings, and then those that only the build has.
-    read : (T,) array of intp
-        The number in `types` of what each trial is recognised as.
+    found : Quick
+        The accuracy, and the number in `types` of what each trial is recognised as.
     sensors : tuple of int
         The numbers of the sensors that the build reads.
-    about : dict
-        What a page shows of it.
 
     Raises
     ------
@@ -62,21 +60,21 @@ class BuildReading:
         self.types = list(dict.fromkeys((*quick.grasps, *build.classes)))
         numbers = np.array([self.types.index(one) for one in build.classes])
         rows = predicted_classes(build.tables, build.manifest.rejection, self._bits, self._codes)
-        self.read = decided(numbers[rows][np.newaxis], quick.trial)[0]
+        read = decided(numbers[rows][np.newaxis], quick.trial)[0]
         people = np.unique(quick.held.subjects, return_inverse=True)[1]
         rate = Rate.predicted(numbers[rows], quick.truth[quick.trial], quick.trial, of="pooled", groups=people)
         known = int(np.count_nonzero(trained_on(build.manifest, quick.held)))
         of = f"{known} of these {len(quick.truth)} trials trained it" if known else "none of these trials trained it"
         self.sensors = tuple(sorted(quick.names.index(name) for name in sensors_read(build.manifest)))
         self._usual = dict[int, NDArray[np.float64]]()
-        self.about = {"of": f"build {name}; {of}", "mean": rate.mean, "low": rate.low, "high": rate.high}
+        self.found = Quick(f"build {name}; {of}", rate.mean, rate.low, rate.high, tuple(read.tolist()))
 
     def decisive(self, trial: int) -> list[int]:
         """Return the sensors that decided for the wrong type of a misread trial, the strongest first; at most 3.
 
         Their terms add more to the recognised type than to the true one, compared with other trials of the true type.
         """
-        truth, read, known = int(self._quick.truth[trial]), int(self.read[trial]), self._build.grasps
+        truth, read, known = int(self._quick.truth[trial]), self.found.read[trial], self._build.grasps
         # A refused frame has no type, and a build may not know a type.
         if truth == read or not {self.types[truth], self.types[read]} <= {*known}:
             return []
@@ -123,19 +121,22 @@ class ErrorsPage:
 
     def _errors(self, asked: Asked) -> bytes:
         """Return as which type the sensors, or the build with an id, recognise every trial."""
-        now, sensors = self._choose.recordings, asked.sensors
-        quick = now.quick
+        now, quick = self._choose.recordings, self._choose.recordings.quick
         if asked.id:
             reading = self._reading(asked.id)
-            sensors = reading.sensors
-            about = {"types": reading.types, "read": reading.read.tolist(), **reading.about}
+            found, types, sensors = reading.found, reading.types, reading.sensors
         else:
-            found = quick.of(sensors)
-            about = {"types": quick.grasps, "read": found.read, "mean": found.mean, "low": found.low}
-            about |= {"high": found.high, "of": f"{found.of}; quick: not nested"}
-        places = quick.places(sensors).tolist()
-        about |= {"truth": quick.truth.tolist(), "places": places, "numbering": now.numbering}
-        return message("errors", about, sensors=sensors, asked=(asked.id, asked.sensors))
+            found, types, sensors = quick.of(asked.sensors), [*quick.grasps], asked.sensors
+        return message(
+            "errors",
+            found,
+            types=types,
+            truth=quick.truth.tolist(),
+            places=quick.places(sensors).tolist(),
+            sensors=sensors,
+            numbering=now.numbering,
+            asked=(asked.id, asked.sensors),
+        )
 
     def _trials(self, asked: Asked) -> bytes:
         """Return the values of sensors in trials, and which decided where one was misread."""

@@ -24,6 +24,12 @@ export function percent(share) {
   return (100 * share).toFixed(1);
 }
 
+/** Return the time of a scan of sensors, in words. */
+export function scanTime(us) {
+  if (us === null) return "unknown: they are more than the chips of one bus read";
+  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
+}
+
 /**
  * List members {id, text, checked} as boxes, whose values are the ids. Boxes that stay keep the focus and what a user
  * ticked.

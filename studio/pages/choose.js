@@ -1,5 +1,5 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { interval, listBoxes, percent, storeChoice, storedChoice, trained } from "./choice.js";
+import { interval, listBoxes, percent, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
 import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
@@ -109,28 +109,11 @@ function show(reply) {
   const change = before && before.sensors.length !== chosen.length ? 100 * (reply.mean - before.mean) : null;
   const moved = change === null ? "" : `; ${change >= 0 ? "+" : ""}${change.toFixed(1)} points by the last click`;
   say($("change"), `trials, ${reply.of}; quick: not nested, and chosen while looking at it${moved}`);
-  say($("weakest"), weakest(reply));
+  say($("weakest"), reply.weakest);
   say($("command"), reply.command || "choose a sensor");
   say($("spoken"), `${chosen.length} sensors, ${percent(reply.mean)} percent`);
   $("measure").disabled = $("train").disabled = !chosen.length;
   certify();
-}
-
-function scanTime(us) {
-  if (us === null) return "unknown: they are more than the chips of one bus read";
-  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
-}
-
-function weakest({ confusion: counts }) {
-  let worst = null;
-  counts.forEach((row, truth) =>
-    row.forEach((count, read) => {
-      if (truth !== read && count > (worst?.count ?? 0)) worst = { count, truth, read };
-    }),
-  );
-  if (!worst) return "none";
-  const total = counts[worst.truth].reduce((sum, count) => sum + count, 0);
-  return `${set.grasps[worst.truth]} recognised as ${set.grasps[worst.read]}: ${worst.count} of ${total} trials`;
 }
 
 /** Show the accuracy that was measured for the chosen sensors, if it was. */

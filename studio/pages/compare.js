@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { listBoxes, percent, ticked } from "./choice.js";
+import { listBoxes, percent, scanTime, ticked } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -52,7 +52,6 @@ function exported({ said, address, name }) {
   commands();
 }
 
-const scan = (us) => (us === null ? "unknown" : us ? `${us.toFixed(0)} µs` : "none is read");
 const points = (share) => `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
 
 function show({ builds, hand, both, only, found, said, unused }) {
@@ -62,7 +61,7 @@ function show({ builds, hand, both, only, found, said, unused }) {
   const rows = [
     ["Recognised of these trials", ({ right, ends }) => `${percent(right / found.trials)} % [${ends.map(percent).join(", ")}]`],
     ["Sensors", (build) => build.sensors],
-    ["Scan of switches and pads", (build) => scan(build.scan_us)],
+    ["Scan of switches and pads", (build) => scanTime(build.scan_us)],
     ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
     ["Accuracy as compiled", (build) => build.stated],
     ...(builds[0].price === null ? [] : [["Price", ({ price }) => price.toFixed(2)]]),

@@ -92,7 +92,8 @@ function show(message) {
   errors = reply.truth.flatMap((_, trial) => (misread(trial) ? [trial] : []));
   say($("rate"), interval(reply));
   const using = reply.sensors.length ? `${reply.sensors.length} sensors` : "no sensor: choose some on the page Choose";
-  say($("about"), `${reply.of}; ${using}; ${errors.length} of ${reply.truth.length} trials misread`);
+  const quick = reply.asked[0] ? "" : "; quick: not nested";
+  say($("about"), `${reply.of}${quick}; ${using}; ${errors.length} of ${reply.truth.length} trials misread`);
   for (const id of ["next", "previous", "all-errors"]) $(id).disabled = !errors.length;
   const trials = reply.types.map(() => []);
   reply.truth.forEach((truth, trial) => trials[truth].push(trial));

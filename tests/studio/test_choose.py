@@ -108,6 +108,24 @@ def test_the_best_is_added_measured_and_compared_with_the_curve(
     assert set(browser.text("command").rpartition(" ")[2].split(",")) == {*curve.points[4].sensors}
 
 
+def test_the_weakest_pair_is_confused_most_often(studio: Start) -> None:
+    opened = studio()
+    request = {"do": "choose", "sensors": [2, 8]}
+    quick, told = answers(opened, request, request | {"do": "errors"})[-2:]
+    types, truth, read = told["types"], told["truth"], told["read"]
+    counts = {(one, other): 0 for one in types for other in types if one != other}
+    for trial, kind in enumerate(truth):
+        if read[trial] != kind:
+            counts[types[kind], types[read[trial]]] += 1
+    most = max(counts.values())
+    assert most > 0
+    assert quick["weakest"] in {
+        f"{one} recognised as {other}: {most} of {truth.count(types.index(one))} trials"
+        for (one, other), count in counts.items()
+        if count == most
+    }
+
+
 def test_a_double_click_adds_a_sensor_once(browser: Browser, studio: Start) -> None:
     """Both clicks are on their way before the first is answered."""
     browser.open(studio().server.url)
@@ -234,7 +252,7 @@ def test_of_more_switches_than_a_bus_reads_only_the_scan_time_is_unknown(studio:
     choices = ({"do": "choose", "sensors": list(range(number))} for number in (2, 1200))
     _, _, few, all_of_them = answers(studio(many), *choices)
     assert few["scan_us"] > 0
-    assert (all_of_them["scan_us"], all_of_them["mean"]) == (None, 1.0)
+    assert (all_of_them["scan_us"], all_of_them["mean"], all_of_them["weakest"]) == (None, 1.0, "none")
 
 
 def test_without_positions_the_sensors_are_drawn_in_a_grid(studio: Start, people: GraspSet) -> None:

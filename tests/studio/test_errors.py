@@ -389,9 +389,9 @@ def test_a_build_recognises_trials_as_it_does_frames(people: GraspSet, trained: 
     reading = BuildReading("build", build, quick)
     bits, codes = select_inputs(people, build.manifest)
     read = [build.classify(*row) for row in zip(bits, codes, strict=True)]
-    assert [reading.types[one] for one in reading.read] == read
-    assert reading.about["mean"] == np.mean(np.array(read) == people.grasps)
-    assert "54 of these 72 trials trained it" in str(reading.about["of"])
+    assert [reading.types[one] for one in reading.found.read] == read
+    assert reading.found.mean == np.mean(np.array(read) == people.grasps)
+    assert "54 of these 72 trials trained it" in reading.found.of
     wrong = [trial for trial in np.flatnonzero(np.array(read) != people.grasps).tolist() if read[trial] != "none"]
     refused = read.index("none")
     assert wrong
