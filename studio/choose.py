@@ -112,6 +112,7 @@ class ChoosePage:
             "grasps": quick.grasps,
             "types": quick.held.taxonomy.types,
             "taxonomy": grasp_set.taxonomy.name,
+            "hand": drawn(grasp_set, hand),
             "joints": _joints(quick.held),
             "trials": _names(ids),
             "numbering": numbering,
@@ -120,7 +121,6 @@ class ChoosePage:
                 for name, kind in zip(quick.names, kinds, strict=True)
             ],
         }
-        self._studio.publish("sensors", message("sensors", drawn(grasp_set, hand)))
         self._studio.publish("set", message("set", about))
 
     @property

@@ -20,7 +20,7 @@ const ask = openPage({
       ask("use", { id: target.value, value: Number(target.checked) });
     });
     sets.forEach(({ name }, at) => ($("sets").children[at].control.checked = !aside.includes(name)));
-    const known = ["reading", "measure", "curve", "train"].filter((what) => took[what] !== undefined);
+    const known = ["measure", "curve", "train"].filter((what) => took[what] !== undefined);
     say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");
   },
   set: (message) => {
@@ -35,12 +35,9 @@ const ask = openPage({
     $("with-set").hidden = Boolean(set.why);
     if (set.why) return;
     listSensors();
+    $("drawn").hidden = !set.hand.switches.length;
+    hand = drawHand($("hand"), set.hand, { onSwitch: (sensor) => toggle(sensor) });
     choose(storedChoice(set.sensors));
-  },
-  sensors: (drawn) => {
-    $("drawn").hidden = !drawn.switches.length;
-    hand = drawHand($("hand"), drawn, { onSwitch: (sensor) => toggle(sensor) });
-    mark();
   },
   quick: (reply) => {
     if (isChosen(reply.sensors)) show(reply);
@@ -77,9 +74,8 @@ function choose(sensors) {
 
 /** Show which sensors are chosen, on the hand and in the list. */
 function mark() {
-  if (!set) return;
   const bits = set.sensors.map((_, sensor) => chosen.includes(sensor));
-  hand?.setClosed(bits);
+  hand.setClosed(bits);
   boxes.forEach((box, sensor) => (box.checked = bits[sensor]));
 }
 

@@ -10,7 +10,6 @@ const percent = (share) => `${Math.round(100 * share)} %`;
 const STEP = 24; // the number of trials that are shown at a time
 
 let set = null; // the message on the set
-let drawn = null; // the message on the hand
 let reply = null; // what the recogniser makes of every trial
 let of = "chosen"; // and which recogniser that is
 let styles = new Map();
@@ -39,7 +38,6 @@ const ask = openPage({
     select([]);
     look();
   },
-  sensors: (message) => (drawn = message),
   recognisers: ({ builds, unused }) => {
     const options = [...$("of").options].slice(0, 2).map(({ value, text }) => ({ id: value, name: text }));
     fillMenu($("of"), [...options, ...builds.map(({ id, name }) => ({ id, name: `build ${name}` }))], options[0].id);
@@ -216,12 +214,12 @@ function card({ trial, shown, decisive }, typical) {
 function hand(shown, decisive, words) {
   const used = new Set(reply.sensors), first = set.sensors.length - set.joints.length;
   const joints = set.joints.filter(({ joint }) => used.has(first + joint));
-  const switches = drawn.switches.filter(({ bit }) => used.has(bit));
+  const switches = set.hand.switches.filter(({ bit }) => used.has(bit));
   if (!switches.length && !joints.length) return [];
   const svg = draw("svg");
   const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
   const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
-  const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
+  const { setClosed, setPose } = drawHand(svg, { ...set.hand, ...outline, switches, joints: plain });
   setClosed(shown.map((share) => share > 0.5));
   setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
   const names = decisive.map((sensor) => set.sensors[sensor].name);

@@ -34,13 +34,13 @@ PRICES = '[[part]]\nname = "plain"\nprice = 2.5\nsensors = ["*"]\n'
 
 
 def answers(opened: Studio, *asked: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return what a page is told of its set and its sensors and, in this order, on what it asks for."""
-    with page(opened.server.url, "sensors,set") as live:
-        found = [json.loads(live.recv(timeout=PATIENCE_S)) for _ in range(2)]
+    """Return what a page is told of its set and, in this order, on what it asks for."""
+    with page(opened.server.url, "set") as live:
+        found = [json.loads(live.recv(timeout=PATIENCE_S))]
         for one in asked:
             live.send(json.dumps(one))
             # What was told on opening may come once more.
-            found.append(until(live, lambda told: told["topic"] not in ("sensors", "set")))
+            found.append(until(live, lambda told: told["topic"] != "set"))
         return found
 
 
@@ -212,7 +212,7 @@ def test_nothing_keeps_people_out_and_a_phone_sees_all(
 def test_two_browsers_do_not_move_each_other(studio: Start) -> None:
     page = studio()
     choices = [{"do": "choose", "sensors": sensors} for sensors in ([0, 1], [9])]
-    assert [answers(page, one)[2]["sensors"] for one in choices] == [[0, 1], [9]]
+    assert [answers(page, one)[1]["sensors"] for one in choices] == [[0, 1], [9]]
 
 
 @pytest.mark.parametrize(
@@ -250,14 +250,14 @@ def test_of_more_switches_than_a_bus_reads_only_the_scan_time_is_unknown(studio:
     closed = np.tile(labels[:, np.newaxis], 1200)
     many = grasp_set_of(["cup", "pen"], labels, switches=closed, subjects=np.repeat(["A", "B"], 12))
     choices = ({"do": "choose", "sensors": list(range(number))} for number in (2, 1200))
-    _, _, few, all_of_them = answers(studio(many), *choices)
+    _, few, all_of_them = answers(studio(many), *choices)
     assert few["scan_us"] > 0
     assert (all_of_them["scan_us"], all_of_them["mean"], all_of_them["weakest"]) == (None, 1.0, "none")
 
 
 def test_without_positions_the_sensors_are_drawn_in_a_grid(studio: Start, people: GraspSet) -> None:
     names = tuple(f"pad {number}" for number in range(8))
-    hand, _ = answers(studio(replace(people, switch_names=names)))
+    hand = answers(studio(replace(people, switch_names=names)))[0]["hand"]
     assert not hand["placed"]
     assert [each["name"] for each in hand["switches"]] == list(names)
     assert [each["bit"] for each in hand["switches"]] == list(range(8))

@@ -147,7 +147,7 @@ def test_the_name_of_a_row_selects_its_errors(browser: Browser, studio: Start) -
 def test_errors_follow_each_other_by_key_and_by_button(browser: Browser, studio: Start) -> None:
     opened = studio()
     open_errors(browser, opened)
-    wrong, trials = misread(errors_of(opened)), answers(opened)[1]["trials"]
+    wrong, trials = misread(errors_of(opened)), answers(opened)[0]["trials"]
     body = browser.driver.find_element(By.TAG_NAME, "body")
 
     def heads(trial: int) -> None:
@@ -171,7 +171,7 @@ def test_the_map_is_pointed_at_clicked_and_encircled(browser: Browser, studio: S
     """By mouse, by a finger, and by keyboard."""
     opened = studio()
     open_errors(browser, opened)
-    reply, trials = errors_of(opened), answers(opened)[1]["trials"]
+    reply, trials = errors_of(opened), answers(opened)[0]["trials"]
     canvas, places = browser.driver.find_element(By.ID, "map"), on_map(browser, reply)
     # The loneliest trial, which nobody can confuse with another.
     apart = np.hypot(*(places[:, np.newaxis] - places).transpose(2, 0, 1)) + 1e6 * np.eye(len(places))
@@ -315,7 +315,7 @@ def test_the_next_error_follows_the_one_that_was_left_out(browser: Browser, stud
     choose_two(browser, opened)
     browser.driver.get(f"{opened.server.url}errors.html")
     browser.wait(lambda: "2 sensors" in browser.text("about"))
-    trials = answers(opened)[1]["trials"]
+    trials = answers(opened)[0]["trials"]
     wrong = misread(errors_of(opened, {"do": "errors", "sensors": [2, 8]}))
     body = browser.driver.find_element(By.TAG_NAME, "body")
     body.send_keys("nn")
@@ -508,7 +508,7 @@ def test_nothing_keeps_people_out_of_any_state(browser: Browser, studio: Start, 
 )
 def test_what_a_page_may_not_ask_for_is_refused(studio: Start, tmp_path: Path, asked: dict[str, Any], why: str) -> None:
     opened = studio()
-    numbering = answers(opened)[1]["numbering"]
+    numbering = answers(opened)[0]["numbering"]
     *_, refused = answers(opened, {**asked, "id": numbering} if asked.get("id") == "it" else asked)
     assert refused["topic"] == "refused"
     assert why in refused["why"]
