@@ -285,7 +285,7 @@ class Sitting:
         return self._studio.station.pressed()
 
     def tell(self) -> None:
-        """Show the accepted trials, and how well they are told apart as they were edited."""
+        """Show the accepted trials, and the accuracy in them, as they were edited."""
         with self._telling:
             if self._accepted is None:
                 return
@@ -301,7 +301,7 @@ class Sitting:
             self._studio.publish("trials", message("trials", about))
 
     def _id(self, trial: Trial) -> TrialId:
-        """Return what the log calls a trial: as `import_recordings` does, which makes one session."""
+        """Return the name of a trial in the log: that in its set, which `import_recordings` makes as one session."""
         return self.output.name, self.collection.subject, "1", trial.grasp, trial.object, trial.number
 
     def _accuracy(self, edited: Sequence[tuple[Trial, str]]) -> dict[str, object] | None:

@@ -133,7 +133,7 @@ class WearerPage:
         return partial(self.adapt, paths)
 
     def adapt(self, paths: Sequence[Path], _: Report) -> dict[str, object]:
-        """Adapt the build of everybody to trials, put the result into use, and return what it is worth."""
+        """Adapt the build of everybody to trials, put the result into use, and return its accuracy."""
         base, build = self.base()
         trials, added = self._trials(paths, build)
         output = self._project.new_path(self._project.state.wearer)

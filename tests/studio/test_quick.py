@@ -56,7 +56,7 @@ def test_a_row_is_read_as_the_type_of_the_largest_density(
     np.add.at(confusion, (samples_of(people, Recipe()).labels, expected), 1)
     found = quick.of(sensors)
     counts = np.zeros((3, 3), int)
-    np.add.at(counts, (quick.truth, found.read), 1)
+    np.add.at(counts, (quick.truth, np.array(found.read)), 1)
     assert counts.tolist() == confusion.tolist()
     assert found.mean == np.trace(confusion) / 72
     assert found.low <= found.mean <= found.high
