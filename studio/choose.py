@@ -96,7 +96,7 @@ class ChoosePage:
             quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
             self._recordings = None
-            self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
+            self._studio.publish("set", why=str(reason), sensors=(), grasps=(), trials=(), name="")
             return
         of_rows = [trial for trial, none in zip(rows, grasp_set.is_none.tolist(), strict=True) if not none]
         ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
@@ -121,7 +121,7 @@ class ChoosePage:
                 for name, kind in zip(quick.names, kinds, strict=True)
             ],
         }
-        self._studio.publish("set", message("set", about))
+        self._studio.publish("set", about)
 
     @property
     def recordings(self) -> Recordings:

@@ -32,7 +32,7 @@ def add_compare_page(studio: Studio) -> None:
         **dict.fromkeys(("report", "firmware"), partial(_exporting, studio)),
     }
     studio.add(requests)
-    studio.publish("targets", message("targets", targets=[(name, target.help) for name, target in TARGETS.items()]))
+    studio.publish("targets", targets=[(name, target.help) for name, target in TARGETS.items()])
 
 
 def _chosen(studio: Studio, asked: Asked) -> tuple[list[Path], list[Path]]:

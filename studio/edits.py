@@ -15,7 +15,6 @@ from thenar.compiler.recordings.edits import Edit, TrialId, named, read_edits
 from thenar.compiler.text import counted
 from thenar.drivers.errors import SettingError
 from thenar.runtime.files import sync_folder
-from thenar.runtime.web.server import message
 
 # Pages edit, and so does a collection, on another thread.
 _WRITING = Lock()
@@ -73,8 +72,8 @@ def last_action(edits: Sequence[Edit]) -> list[Edit]:
     return [edit for edit in left if edit.action == left[-1].action]
 
 
-def edits_message(path: Path) -> bytes:
-    """Return the message on the log: the last action that can be taken back, in words, and what trials were `made`.
+def edits_shown(path: Path) -> dict[str, object]:
+    """Return what pages show of the log: the last action that can be taken back, in words, and what trials were made.
 
     Raises RecordingError for a damaged log, and OSError.
     """
@@ -83,7 +82,7 @@ def edits_message(path: Path) -> bytes:
     what = counted(len(last), "trial") if len(last) > 1 else named(last[0].of) if last else ""
     done = f"{what} {f'made {last[0].new}' if last[0].new else 'left out'}" if last else ""
     made = [(edit.new, edit.set, edit.trial) for edit in latest.values() if edit.new != edit.grasp]
-    return message("edits", words=done, made=made)
+    return {"words": done, "made": made}
 
 
 def _append(path: Path, edits: Sequence[Edit], changes: Sequence[tuple[TrialId, str, str]], undo: int = 0) -> None:

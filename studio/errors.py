@@ -117,7 +117,7 @@ class ErrorsPage:
                 builds.append(member)
             except (ThenarError, OSError) as reason:
                 unused.append(f"build {member.name} is left out: {reason}")
-        self._studio.publish("recognisers", message("recognisers", builds=builds, unused=unused))
+        self._studio.publish("recognisers", builds=builds, unused=unused)
 
     def _errors(self, asked: Asked) -> bytes:
         """Return as which type the sensors, or the build with an id, recognise every trial."""

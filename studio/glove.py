@@ -31,7 +31,7 @@ from thenar.runtime.web.server import message
 from .calibrating import PRESS_WORDS, Codes, PressStage, lead_poses, lead_presses
 from .collecting import WAIT_US
 from .sensors import GloveSensors
-from .studio import Asked, Report, Studio, glove_message
+from .studio import Asked, Report, Studio, glove_shown
 
 _LISTEN_S, _HOLD_S, _BAUD = 5.0, 1.0, 115_200
 _SHOW_S, _RATE_S, _PAST_S = 0.2, 1.0, 30.0
@@ -76,9 +76,7 @@ class GlovePage:
             except (ThenarError, OSError) as reason:
                 why = str(reason)
         ports = sorted(str(port) for pattern in _PORTS for port in Path("/dev").glob(pattern))
-        self._studio.publish(
-            "glove-hand", message("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports)
-        )
+        self._studio.publish("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports)
 
     def _sensors(self) -> GloveSensors:
         return GloveSensors(self._project.wiring(), self._project.hand())
@@ -91,7 +89,7 @@ class GlovePage:
         self._studio.station.start("looking", partial(self._find, asked.name))
 
     def _find(self, port: str, stop: Event) -> None:
-        self._studio.publish("found", message("found", port=port, busy=True))
+        self._studio.publish("found", port=port, busy=True)
         text, wrong = "", list[str]()
         try:
             found = propose_stream(port, _BAUD, _LISTEN_S)
@@ -102,7 +100,7 @@ class GlovePage:
         except (ThenarError, OSError) as reason:
             content, wrong = {"columns": (), "rows": 0, "remarks": ()}, [of_device(port, str(reason))]
         self._proposal = "" if wrong else text
-        self._studio.publish("found", message("found", content, port=port, busy=False, text=text, wrong=wrong))
+        self._studio.publish("found", content, port=port, busy=False, text=text, wrong=wrong)
 
     def _on_connect(self, _asked: Asked) -> None:
         """Write the proposed glove.toml."""
@@ -121,7 +119,7 @@ class GlovePage:
             self._show(stop)
         finally:
             # A page that is opened later shows nothing old.
-            self._studio.publish("glove-state", message("glove-state", states=()))
+            self._studio.publish("glove-state", states=())
 
     def _show(self, stop: Event) -> None:
         """Show the state of every sensor, until `stop` is set."""
@@ -162,17 +160,14 @@ class GlovePage:
                         for value, kind, changed, since in zip(shown, kinds, changes, before, strict=True)
                     ]
                     devices = sources.health()
-                    self._studio.publish("glove", glove_message(devices))
+                    self._studio.publish("glove", glove_shown(devices))
                     self._studio.publish(
                         "glove-state",
-                        message(
-                            "glove-state",
-                            sensors.drawn(shown),
-                            states=states,
-                            devices=devices,
-                            rates=rates,
-                            problem=_problem(sensors, states, devices),
-                        ),
+                        sensors.drawn(shown),
+                        states=states,
+                        devices=devices,
+                        rates=rates,
+                        problem=_problem(sensors, states, devices),
                     )
 
     def _on_past(self, asked: Asked) -> bytes:
@@ -196,7 +191,7 @@ class GlovePage:
         try:
             work(stop)
         finally:
-            self._studio.publish("calibrating", message("calibrating", step=""))
+            self._studio.publish("calibrating", step="")
 
     def _calibrate_joints(self, stop: Event) -> None:
         def view(guide: PoseGuide) -> list[PoseKey]:
@@ -212,7 +207,7 @@ class GlovePage:
                 "faults": ["The glove is silent."] * silent + [f"{name}: {state}" for name, state in states if state],
                 "keys": {key: what for key, what in words.items() if key in offered},
             }
-            self._studio.publish("calibrating", message("calibrating", content))
+            self._studio.publish("calibrating", content)
             return self._studio.station.pressed()
 
         guide = lead_poses(str(self._project.harness), _BAUD, _HOLD_S, view, stop)
@@ -233,7 +228,7 @@ class GlovePage:
                 "faults": [f"{name}: not read" for name, count in zip(names, counts, strict=True) if count is None],
                 "keys": {"accept": words[stage]} if stage in words else {},
             }
-            self._studio.publish("calibrating", message("calibrating", content))
+            self._studio.publish("calibrating", content)
             return "accept" in self._studio.station.pressed()
 
         found = lead_presses(self._project.harness, _HOLD_S, view, stop, self._project.state.wearer)
@@ -251,7 +246,7 @@ class GlovePage:
         lacking = [name for name in names if name not in found]
         said = f"{file}: {len(found)} of {len(names)} are calibrated"
         said += f"; {list_names(lacking)} did not move" if lacking else ""
-        self._studio.publish("calibrated", message("calibrated", said=said))
+        self._studio.publish("calibrated", said=said)
         self._studio.changed()
 
 

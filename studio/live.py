@@ -11,7 +11,6 @@ from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.glove import Glove
 from thenar.runtime.web.live import LivePage
 from thenar.runtime.web.replay import Replay
-from thenar.runtime.web.server import message
 
 from .studio import Asked, Handler, Report, Studio
 
@@ -52,7 +51,7 @@ class StudioLive:
         paths = {member.id: quote(str(project.folder / member.name)) for member in members}
         why, built = self._lacking(), project.build()
         run = "" if built is None else project.command(["run", built[0], "--glove", project.harness, "--web"])
-        self._studio.publish("live", message("live", paths=paths, run=run, why=why, unread=self._unread))
+        self._studio.publish("live", paths=paths, run=run, why=why, unread=self._unread)
 
     def _lacking(self) -> str:
         """Return in a sentence what a run lacks, or ""."""

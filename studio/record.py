@@ -36,7 +36,7 @@ from .collecting import collect, standing, task
 from .edits import change, load_edits, restore
 from .quick import QuickAccuracy
 from .sensors import GloveSensors
-from .studio import Asked, Handler, Report, Studio, glove_message
+from .studio import Asked, Handler, Report, Studio, glove_shown
 from .wearer import WearerPage
 
 _MOST_REPETITIONS = 1000
@@ -62,7 +62,7 @@ class RecordPage:
             "relabel": self._relabel,
         }
         studio.add(requests, self.read)
-        studio.publish("collecting", message("collecting", stage="over"))
+        studio.publish("collecting", stage="over")
 
     def read(self, report: Report) -> None:
         """Show which recordings can be continued, and what can be recorded."""
@@ -74,13 +74,10 @@ class RecordPage:
             self._sitting.tell()
         self._studio.publish(
             "recordings",
-            message(
-                "recordings",
-                unfinished=found,
-                taxonomies=["kamakura14", "cutkosky16", "feix33", "own"],
-                objects=self._objects is not None,
-                glove=self._project.harness.exists(),
-            ),
+            unfinished=found,
+            taxonomies=["kamakura14", "cutkosky16", "feix33", "own"],
+            objects=self._objects is not None,
+            glove=self._project.harness.exists(),
         )
 
     @property
@@ -172,7 +169,7 @@ class RecordPage:
     def _lead(self, sitting: "Sitting", stop: Event) -> None:
         """Lead a collection, and write the set of all its accepted trials when it ends."""
         self._sitting = sitting
-        self._studio.publish("finished", message("finished", set=""))
+        self._studio.publish("finished", set="")
         try:
             if done := sitting.lead(stop):
                 self._write(sitting, done)
@@ -192,7 +189,7 @@ class RecordPage:
         grasp_set.save(sitting.output)
         warnings = [finding.message for finding in report.warnings]
         about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
-        self._studio.publish("finished", message("finished", about, done=done, total=total))
+        self._studio.publish("finished", about, done=done, total=total)
         if build is not None and done == total and collection.subject == self._project.state.wearer:
             self._studio.queue("adapt", partial(self._wearer.adapt, [sitting.output]))
 
@@ -240,15 +237,15 @@ class Sitting:
 
     def lead(self, stop: Event) -> int:
         """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
-        self._studio.publish("collecting", message("collecting", stage="waiting", adapts=self._adapts))
+        self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
         # Those of the collection before are no longer shown.
-        self._studio.publish("trials", message("trials", set="", trials=(), types=(), accuracy=None))
+        self._studio.publish("trials", set="", trials=(), types=(), accuracy=None)
         if self._journal is not None:
             self._captured = _captured(self.recording)
         try:
             return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
         finally:
-            self._studio.publish("collecting", message("collecting", stage="over"))
+            self._studio.publish("collecting", stage="over")
 
     def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
         """Show the guide's state ten times a second and at every change; return the keys pressed."""
@@ -280,8 +277,8 @@ class Sitting:
                 "total": guide.total,
                 "skipped": guide.skipped,
             }
-            self._studio.publish("collecting", message("collecting", content))
-            self._studio.publish("glove", glove_message(devices))
+            self._studio.publish("collecting", content)
+            self._studio.publish("glove", glove_shown(devices))
         return self._studio.station.pressed()
 
     def tell(self) -> None:
@@ -298,7 +295,7 @@ class Sitting:
             edited = [(trial, made.get(trial.number, trial.grasp)) for trial in trials]
             accuracy = self._accuracy([one for one in edited if one[1] not in ("", NONE)])
             about = {"set": self.output.name, "trials": shown, "types": types, "accuracy": accuracy}
-            self._studio.publish("trials", message("trials", about))
+            self._studio.publish("trials", about)
 
     def _id(self, trial: Trial) -> TrialId:
         """Return the name of a trial in the log: that in its set, which `import_recordings` makes as one session."""

@@ -24,9 +24,9 @@ from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.names import shortened
 from thenar.runtime.published import DeviceHealth
 from thenar.runtime.web.live import shell_message
-from thenar.runtime.web.server import Message, Server, message
+from thenar.runtime.web.server import Server, message
 
-from .edits import edits_message
+from .edits import edits_shown
 from .project import Project
 
 PAGES = Path(__file__).parent / "pages"
@@ -110,7 +110,7 @@ class Studio(Closing):
         self._stale = False
         self._began_s, self._cancelled = 0.0, False
         self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
-        self.station = Station(self.server.publish)
+        self.station = Station(self.publish)
         self.closing = ExitStack()
 
     def add(self, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None) -> None:
@@ -121,9 +121,9 @@ class Studio(Closing):
         self._requests |= requests
         self._readers += [] if read is None else [read]
 
-    def publish(self, topic: str, made: Message) -> None:
-        """Make this the newest message of its topic."""
-        self.server.publish(topic, made)
+    def publish(self, topic: str, content: object = None, **more: object) -> None:
+        """Make these fields, as `message` takes them, the newest message of a topic."""
+        self.server.publish(topic, message(topic, content, **more))
 
     def queue(self, what: str, work: Job) -> None:
         """Do this later, and publish its result as the message `what`.
@@ -143,8 +143,9 @@ class Studio(Closing):
             about = () if built is None else (built[0], built[1].manifest)
         # And what is wrong with the log of edits, by Choose.
         with suppress(ThenarError, OSError):
-            self.publish("edits", edits_message(self.project.edits))
-        self.publish("shell", shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer))
+            self.publish("edits", edits_shown(self.project.edits))
+        shell = shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer)
+        self.server.publish("shell", shell)
         self._show_members()
         # Of several changes the last is read: a recording or a build may come while another is read.
         if not self._stale:
@@ -175,8 +176,8 @@ class Studio(Closing):
                 report(0, 1)
                 made = work(report)
                 if made is not None:
-                    self.publish(what, message(what, made))
-                self.publish("work", message("work", done=1, total=1, what=what))
+                    self.publish(what, made)
+                self.publish("work", done=1, total=1, what=what)
                 if what != "reading":
                     took = round(monotonic() - self._began_s, 1)
                     # A folder that cannot be written to is read all the same.
@@ -184,7 +185,7 @@ class Studio(Closing):
                         self.project.remember(took=self.project.state.took | {what: took})
                     self._show_members()
             except Exception as reason:
-                self.publish("work", message("work", done=0, total=0, why=_sentence(reason)))
+                self.publish("work", done=0, total=0, why=_sentence(reason))
 
     def close(self) -> None:
         """End what uses the glove, and close the pages."""
@@ -194,7 +195,7 @@ class Studio(Closing):
 
     def _show_members(self) -> None:
         kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
-        self.publish("project", message("project", kinds, state=self.project.state))
+        self.publish("project", kinds, state=self.project.state)
 
     def _report(self, what: str, done: int, total: int) -> None:
         """Tell how far the work is, and how long it takes still: as its parts so far, or as the last time, if known.
@@ -205,7 +206,7 @@ class Studio(Closing):
             raise ThenarError("cancelled")
         spent, last = monotonic() - self._began_s, self.project.state.took.get(what)
         left = spent / done * (total - done) if done else None if last is None else max(last - spent, 0.0)
-        self.publish("work", message("work", done=done, total=total, what=what, left_s=left))
+        self.publish("work", done=done, total=total, what=what, left_s=left)
 
     def _cancel(self, _: Asked) -> None:
         """End the work at its next report."""
@@ -236,10 +237,10 @@ class Station:
     Parameters
     ----------
     publish : callable
-        As `Server.publish`. The topic "station" says what uses the glove, and why it ended.
+        As `Studio.publish`. The topic "station" says what uses the glove, and why it ended.
     """
 
-    def __init__(self, publish: Callable[[str, Message], None]) -> None:
+    def __init__(self, publish: Callable[..., None]) -> None:
         self._publish, self._stop = publish, Event()
         self._thread: Thread | None = None
         self._keys, self._pressed = tuple[str, ...](), SimpleQueue[str]()
@@ -296,9 +297,9 @@ class Station:
         self._tell(self.doing, why)
 
     def _tell(self, doing: str, why: str = "") -> None:
-        self._publish("station", message("station", doing=doing, why=why))
+        self._publish("station", doing=doing, why=why)
         if not doing:
-            self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
+            self._publish("glove", {"is": "warn", "words": "not in use"})
 
 
 def _sentence(reason: Exception) -> str:
@@ -310,7 +311,7 @@ def _sentence(reason: Exception) -> str:
     return f"a bug in thenar: {type(reason).__name__}"
 
 
-def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
-    """Return the message on the bar about the state of the glove's devices."""
+def glove_shown(devices: Sequence[DeviceHealth]) -> dict[str, object]:
+    """Return the fields of the message on the bar about the state of the glove's devices."""
     lost = ", ".join(f"{device.name} lost" for device in devices if not device.connected)
-    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"}, lasts_s=_LASTS_S)
+    return {"is": "bad" if lost else "good", "words": lost or "connected", "lasts_s": _LASTS_S}

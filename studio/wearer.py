@@ -45,7 +45,7 @@ class WearerPage:
         try:
             base, build = self.base()
         except ThenarError as reason:
-            self._studio.publish("wearing", message("wearing", about, why=str(reason), sets=()))
+            self._studio.publish("wearing", about, why=str(reason), sets=())
             return
         members = self._project.members("set")
         sets = []
@@ -59,7 +59,7 @@ class WearerPage:
         record += ["-o", self._project.new_path(state.wearer, ".grasps", ".mcap")]
         about |= {"base": base.name, "types": types, "sets": sets, "glove": self._project.harness.exists()}
         about |= {"build": state.build, "undo": self._former, "record": self._project.command(record)}
-        self._studio.publish("wearing", message("wearing", about, why=""))
+        self._studio.publish("wearing", about, why="")
 
     def base(self) -> tuple[Path, Build]:
         """Return the build of everybody: the one in use, or that which was adapted to become it. Raises ThenarError."""

@@ -144,7 +144,10 @@ def test_a_station_waits_for_no_device_and_a_recording_is_ended_by_nobody() -> N
         recorded.set()
         stop.wait()
 
-    station = Station(told.__setitem__)
+    def publish(topic: str, content: object = None, **more: object) -> None:
+        told[topic] = message(topic, content, **more)
+
+    station = Station(publish)
     station.start("watching", watch)
     station.start("recording", record)
     assert station.doing == "recording"
