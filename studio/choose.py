@@ -5,10 +5,10 @@ nested folds and the curve of what sensors are worth take longer. They are queue
 """
 
 import hashlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from shlex import quote
 from typing import Any
 
 import msgspec
@@ -29,9 +29,9 @@ from thenar.runtime.hand import DrawnJoint, DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.web.server import message
 
-from .quick import QuickAccuracy
+from .quick import Quick, QuickAccuracy
 from .sensors import placed, scan_time_us
-from .studio import Asked, Handler, Report, Studio
+from .studio import Asked, Handler, Job, Report, Studio
 
 _BUILD = "build"
 
@@ -83,7 +83,7 @@ class ChoosePage:
             "add": lambda asked: self._found("add", asked.sensors),
             "drop": lambda asked: self._found("drop", asked.sensors),
             "use": self._use,
-            **dict.fromkeys(("measure", "curve", "train"), self._later),
+            **dict.fromkeys(("measure", "curve", "train"), self._job),
         }
         studio.add(requests, self.read)
 
@@ -96,7 +96,7 @@ class ChoosePage:
             quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
             self._recordings = None
-            self._studio.publish("set", message("set", why=str(reason), sensors=(), grasps=(), trials=(), name=""))
+            self._studio.publish("set", why=str(reason), sensors=(), grasps=(), trials=(), name="")
             return
         of_rows = [trial for trial, none in zip(rows, grasp_set.is_none.tolist(), strict=True) if not none]
         ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
@@ -112,6 +112,7 @@ class ChoosePage:
             "grasps": quick.grasps,
             "types": quick.held.taxonomy.types,
             "taxonomy": grasp_set.taxonomy.name,
+            "hand": drawn(grasp_set, hand),
             "joints": _joints(quick.held),
             "trials": _names(ids),
             "numbering": numbering,
@@ -120,8 +121,7 @@ class ChoosePage:
                 for name, kind in zip(quick.names, kinds, strict=True)
             ],
         }
-        self._studio.publish("sensors", message("sensors", drawn(grasp_set, hand)))
-        self._studio.publish("set", message("set", about))
+        self._studio.publish("set", about)
 
     @property
     def recordings(self) -> Recordings:
@@ -141,19 +141,20 @@ class ChoosePage:
         self._project.remember(aside=tuple(sorted(aside - {name} if asked.value else aside | {name})))
         self._studio.changed()
 
-    def _later(self, asked: Asked) -> None:
+    def _job(self, asked: Asked) -> Job:
         if asked.do != "curve" and not asked.sensors:
             raise ThenarError("choose a sensor first: without any, nothing can be learnt")
         names = self.recordings.names(asked.sensors)
-        self._studio.queue(asked.do, partial(self._measure, asked, names))
+        return partial(self._measure, asked, names)
 
     def _reply(self, sensors: Sequence[int]) -> bytes:
         now = self.recordings
-        names = now.names(sensors)
+        names, found = now.names(sensors), now.quick.of(sensors)
         return message(
             "quick",
-            now.quick.of(sensors),
+            found,
             sensors=sensors,
+            weakest=_weakest(now.quick, found),
             scan_us=scan_time_us([now.levels[name] for name in names if name in now.levels]),
             price=sum(now.prices[name] for name in names) if now.parts else None,
             command=self._command(now.files, names),
@@ -163,13 +164,12 @@ class ChoosePage:
         """Return the commands that compile a build of these sensors from these sets."""
         if not names:
             return ""
-        first, recordings = self._project.joined([self._project.folder / name for name in files])
-        have, more = quote(",".join(names)), "".join(f" {quote(option)}" for option in self._project.options())
-        output = quote(str(self._project.new_path(_BUILD)))
-        return f"{first}thenar compile {recordings} -o {output}{more} --sensors {len(names)} --have {have}"
+        more: list[object] = ["-o", self._project.new_path(_BUILD), *self._project.options()]
+        more += ["--sensors", len(names), "--have", ",".join(names)]
+        return self._project.command(["compile"], [self._project.folder / name for name in files], more)
 
-    def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> None:
-        """Measure the curve, or the accuracy of chosen sensors, or train a build of these; tell all pages.
+    def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> dict[str, object]:
+        """Measure the curve, or the accuracy of chosen sensors, or train a build of these.
 
         Raises ThenarError if their numbers mean other sensors by now.
         """
@@ -182,15 +182,24 @@ class ChoosePage:
             output = self._project.new_path(_BUILD)
             documents = Documents(now.hand, parts=now.parts)
             built = compile_build(now.grasp_set, output, recipe, documents=documents, progress=report, **many)
-            content: dict[str, Any] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
+            content: dict[str, object] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
             self._project.remember(build=output.name)
             self._studio.changed()
         else:
             limits = Limits.of(recipe, now.grasp_set, {}, prices=now.prices)
             study = study_sensors(now.grasp_set, recipe, limits=limits, report=report, **many)
             content = _content(study, now.quick.names)
-        content |= {"sensors": asked.sensors, "numbering": now.numbering}
-        self._studio.publish(asked.do, message(asked.do, content))
+        return content | {"sensors": asked.sensors, "numbering": now.numbering}
+
+
+def _weakest(quick: QuickAccuracy, found: Quick) -> str:
+    """Return the two types of which one is recognised as the other most often, in words."""
+    pairs = Counter(pair for pair in zip(quick.truth.tolist(), found.read, strict=True) if pair[0] != pair[1])
+    if not pairs:
+        return "none"
+    truth, read = worst = max(sorted(pairs), key=lambda pair: pairs[pair])
+    total = np.count_nonzero(quick.truth == truth)
+    return f"{quick.grasps[truth]} recognised as {quick.grasps[read]}: {pairs[worst]} of {total} trials"
 
 
 def _levels(grasp_set: GraspSet) -> dict[str, str]:

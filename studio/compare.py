@@ -1,6 +1,7 @@
 """The page *Compare*: two builds on the same trials and on one hand; and what is exported of a build."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -20,45 +21,36 @@ from thenar.runtime.web.server import message
 from .choose import drawn
 from .project import Project
 from .sensors import scan_time_us, sensors_read
-from .studio import Asked, Handler, Report, Studio
+from .studio import Asked, Handler, Job, Report, Studio
 
 
 def add_compare_page(studio: Studio) -> None:
     """Add the page *Compare* to a studio."""
     requests: dict[str, Handler] = {
-        "compare": partial(_later, studio),
-        "comparison": partial(_comparison, studio),
+        "compare": partial(_comparison, studio),
         "commands": partial(_commands, studio),
-        **dict.fromkeys(("report", "firmware"), partial(_queue, studio)),
+        **dict.fromkeys(("report", "firmware"), partial(_exporting, studio)),
     }
     studio.add(requests)
-    studio.publish("targets", message("targets", targets=[(name, target.help) for name, target in TARGETS.items()]))
+    studio.publish("targets", targets=[(name, target.help) for name, target in TARGETS.items()])
 
 
 def _chosen(studio: Studio, asked: Asked) -> tuple[list[Path], list[Path]]:
-    """Return two builds, and sets, or all in use. Raises SettingError for other ids, and without a set."""
-    if len(asked.ids) < 2 or asked.ids[0] == asked.ids[1]:
-        raise SettingError("choose two builds to compare")
-    sets = [studio.project.path("set", member) for member in asked.ids[2:]] or studio.project.sets()
-    if not sets:
-        raise SettingError("the project has no recordings in use, on which builds could be compared")
-    return [studio.project.path("build", member) for member in asked.ids[:2]], sets
+    """Return two builds and sets. Raises SettingError for other ids."""
+    if len(asked.ids) < 3 or asked.ids[0] == asked.ids[1]:
+        raise SettingError("choose two builds to compare, and recordings on which to compare them")
+    builds = [studio.project.path("build", member) for member in asked.ids[:2]]
+    return builds, [studio.project.path("set", member) for member in asked.ids[2:]]
 
 
-def _later(studio: Studio, asked: Asked) -> None:
-    builds, sets = _chosen(studio, asked)
-    studio.queue("compare", partial(_compare, studio, asked.ids, builds, sets))
+def _comparison(studio: Studio, asked: Asked) -> Job:
+    return partial(_compare, studio.project, asked.ids, *_chosen(studio, asked))
 
 
-def _comparison(studio: Studio, asked: Asked) -> bytes:
-    """Return the command that compares two builds."""
-    builds, sets = _chosen(studio, asked)
-    first, recordings = studio.project.joined(sets)
-    return message("comparison", command=f"{first}{join(['thenar', 'compare', *map(str, builds)])} {recordings}")
-
-
-def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Sequence[Path], report: Report) -> None:
-    project, builds = studio.project, [Build.load(path) for path in paths]
+def _compare(
+    project: Project, ids: Sequence[str], paths: Sequence[Path], sets: Sequence[Path], report: Report
+) -> dict[str, object]:
+    builds = [Build.load(path) for path in paths]
     grasp_set, _, unused = project.recordings(sets)
     found = compare_builds(paths[0], paths[1], grasp_set, report)
     kept = [sensors_read(build.manifest) for build in builds]
@@ -76,7 +68,8 @@ def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Se
         }
         for path, build, names, right, ends in zip(paths, builds, kept, (found.a, found.b), found.ends, strict=True)
     ]
-    about = {
+    return {
+        "ids": ids,
         "hand": drawn(grasp_set, project.hand().fitted(grasp_set.element_names)),
         "builds": shown,
         "both": [name for name in kept[0] if name in kept[1]],
@@ -85,7 +78,6 @@ def _compare(studio: Studio, ids: Sequence[str], paths: Sequence[Path], sets: Se
         "said": _said(found, *(path.name for path in paths)),
         "unused": unused,
     }
-    studio.publish("compare", message("compare", about, ids=ids))
 
 
 def _said(found: BuildComparison, a: str, b: str) -> str:
@@ -106,20 +98,24 @@ def _places(project: Project, asked: Asked) -> tuple[Path, Path, Path]:
 
 
 def _commands(studio: Studio, asked: Asked) -> bytes:
-    """Return the commands that export what the buttons do."""
+    """Return the commands that do what the buttons do; "" for what cannot be done."""
     build, page, folder = _places(studio.project, asked)
-    firmware = ["thenar", "firmware", str(build), "--target", asked.name, "-o", str(folder)]
+    firmware = studio.project.command(["firmware", build, "--target", asked.name, "-o", folder])
     report = ["cp", str(build / REPORT_NAME), str(page)] if (build / REPORT_NAME).exists() else []
-    return message("commands", report=join(report), firmware=join(firmware))
+    compare = ""
+    with suppress(SettingError):
+        builds, sets = _chosen(studio, asked)
+        compare = studio.project.command(["compare", *builds], sets)
+    return message("commands", report=join(report), firmware=firmware, compare=compare)
 
 
-def _queue(studio: Studio, asked: Asked) -> None:
+def _exporting(studio: Studio, asked: Asked) -> Job:
     _places(studio.project, asked)
-    studio.queue(asked.do, partial(_export, studio, asked))
+    return partial(_export, studio, asked)
 
 
-def _export(studio: Studio, asked: Asked, _: Report) -> None:
-    """Write a build's report, or its firmware, into the project, and tell all pages where."""
+def _export(studio: Studio, asked: Asked, _: Report) -> dict[str, object]:
+    """Write a build's report, or its firmware, into the project, and return where."""
     build, page, folder = _places(studio.project, asked)
     if asked.do == "firmware":
         loaded, content = Build.load(build), BytesIO()
@@ -132,4 +128,4 @@ def _export(studio: Studio, asked: Asked, _: Report) -> None:
     else:
         name, saved, said = page.name, report_of_build(build), f"{page} works offline, in any browser"
         write_atomically(page, saved)
-    studio.publish("exported", message("exported", said=said, address=studio.server.offer(name, saved), name=name))
+    return {"said": said, "address": studio.server.offer(name, saved), "name": name}

@@ -4,15 +4,20 @@ Each is appended, also an undo, which edits the trials back; the recordings stay
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from threading import Lock
 
 import msgspec
 
-from thenar.compiler.recordings.edits import Edit, TrialId, read_edits
+from thenar.compiler.recordings.edits import Edit, TrialId, named, read_edits
+from thenar.compiler.text import counted
 from thenar.drivers.errors import SettingError
 from thenar.runtime.files import sync_folder
+
+# Pages edit, and so does a collection, on another thread.
+_WRITING = Lock()
 
 
 def load_edits(path: Path) -> tuple[list[Edit], str]:
@@ -25,12 +30,13 @@ def change(path: Path, trials: Sequence[TrialId], new: str) -> None:
 
     Raises SettingError if all trials are so already, RecordingError for a damaged log, and OSError.
     """
-    edits = load_edits(path)[0]
-    now = {edit.of: edit.new for edit in edits}
-    changed = [trial for trial in dict.fromkeys(trials) if now.get(trial, trial[3]) != new]
-    if not changed:
-        raise SettingError("these trials are left out already" if not new else f"these trials are {new} already")
-    _append(path, edits, [(trial, now.get(trial, trial[3]), new) for trial in changed])
+    with _WRITING:
+        edits = load_edits(path)[0]
+        now = {edit.of: edit.new for edit in edits}
+        changed = [trial for trial in dict.fromkeys(trials) if now.get(trial, trial[3]) != new]
+        if not changed:
+            raise SettingError("these trials are left out already" if not new else f"these trials are {new} already")
+        _append(path, edits, [(trial, now.get(trial, trial[3]), new) for trial in changed])
 
 
 def undo(path: Path) -> None:
@@ -38,11 +44,25 @@ def undo(path: Path) -> None:
 
     Raises SettingError if there is none, RecordingError for a damaged log, and OSError.
     """
-    edits = load_edits(path)[0]
-    last = last_action(edits)
-    if not last:
-        raise SettingError("there is nothing to undo")
-    _append(path, edits, [(edit.of, edit.new, edit.old) for edit in last], last[0].action)
+    with _WRITING:
+        edits = load_edits(path)[0]
+        last = last_action(edits)
+        if not last:
+            raise SettingError("there is nothing to undo")
+        _append(path, edits, [(edit.of, edit.new, edit.old) for edit in last], last[0].action)
+
+
+def restore(path: Path, name: str, kept: Container[int]) -> bool:
+    """Take back what became of the trials of the set `name` with other numbers than `kept`; return whether it was any.
+
+    Their actions cannot be undone any more. Raises RecordingError for a damaged log, and OSError.
+    """
+    with _WRITING:
+        latest = {edit.of: edit for edit in load_edits(path)[0] if edit.set == name and edit.trial not in kept}
+        found = [edit for edit in latest.values() if edit.new != edit.grasp]
+        for edit in found:
+            _append(path, load_edits(path)[0], [(edit.of, edit.new, edit.grasp)], edit.action)
+        return bool(found)
 
 
 def last_action(edits: Sequence[Edit]) -> list[Edit]:
@@ -50,6 +70,19 @@ def last_action(edits: Sequence[Edit]) -> list[Edit]:
     undone = {edit.undo for edit in edits}
     left = [edit for edit in edits if not edit.undo and edit.action not in undone]
     return [edit for edit in left if edit.action == left[-1].action]
+
+
+def edits_shown(path: Path) -> dict[str, object]:
+    """Return what pages show of the log: the last action that can be taken back, in words, and what trials were made.
+
+    Raises RecordingError for a damaged log, and OSError.
+    """
+    edits = load_edits(path)[0]
+    last, latest = last_action(edits), {edit.of: edit for edit in edits}
+    what = counted(len(last), "trial") if len(last) > 1 else named(last[0].of) if last else ""
+    done = f"{what} {f'made {last[0].new}' if last[0].new else 'left out'}" if last else ""
+    made = [(edit.new, edit.set, edit.trial) for edit in latest.values() if edit.new != edit.grasp]
+    return {"words": done, "made": made}
 
 
 def _append(path: Path, edits: Sequence[Edit], changes: Sequence[tuple[TrialId, str, str]], undo: int = 0) -> None:

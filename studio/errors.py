@@ -1,4 +1,4 @@
-"""The page *Errors*: which trials are misread, by chosen sensors or by the build in use, and edits of trials.
+"""The page *Errors*: which trials are misread, by chosen sensors or by a build, and edits of trials.
 
 A page names trials by their numbers; an edit also says which numbering they are of, so that none is for another trial.
 """
@@ -9,18 +9,17 @@ from numpy.typing import NDArray
 from thenar.compiler.artifact.training import trained_on
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recogniser import predicted_classes
-from thenar.compiler.recordings.edits import named
 from thenar.compiler.samples import decided, select_inputs
-from thenar.compiler.text import counted
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.build import Build
+from thenar.runtime.build import Build, load_manifest
 from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.names import shortened
 from thenar.runtime.web.server import message
 
 from .choose import ChoosePage
-from .edits import change, last_action, load_edits, undo
-from .quick import QuickAccuracy, strongest
+from .edits import change, undo
+from .project import Member
+from .quick import Quick, QuickAccuracy, strongest
 from .sensors import sensors_read
 from .studio import Asked, Handler, Report, Studio
 
@@ -44,12 +43,10 @@ class BuildReading:
     ----------
     types : list of str
         The types of the recordings, and then those that only the build has.
-    read : (T,) array of intp
-        The number in `types` of what each trial is recognised as.
+    found : Quick
+        The accuracy, and the number in `types` of what each trial is recognised as.
     sensors : tuple of int
         The numbers of the sensors that the build reads.
-    about : dict
-        What a page shows of it.
 
     Raises
     ------
@@ -63,21 +60,21 @@ class BuildReading:
         self.types = list(dict.fromkeys((*quick.grasps, *build.classes)))
         numbers = np.array([self.types.index(one) for one in build.classes])
         rows = predicted_classes(build.tables, build.manifest.rejection, self._bits, self._codes)
-        self.read = decided(numbers[rows][np.newaxis], quick.trial)[0]
+        read = decided(numbers[rows][np.newaxis], quick.trial)[0]
         people = np.unique(quick.held.subjects, return_inverse=True)[1]
         rate = Rate.predicted(numbers[rows], quick.truth[quick.trial], quick.trial, of="pooled", groups=people)
         known = int(np.count_nonzero(trained_on(build.manifest, quick.held)))
         of = f"{known} of these {len(quick.truth)} trials trained it" if known else "none of these trials trained it"
         self.sensors = tuple(sorted(quick.names.index(name) for name in sensors_read(build.manifest)))
         self._usual = dict[int, NDArray[np.float64]]()
-        self.about = {"of": f"build {name}; {of}", "mean": rate.mean, "low": rate.low, "high": rate.high}
+        self.found = Quick(f"build {name}; {of}", rate.mean, rate.low, rate.high, tuple(read.tolist()))
 
     def decisive(self, trial: int) -> list[int]:
         """Return the sensors that decided for the wrong type of a misread trial, the strongest first; at most 3.
 
         Their terms add more to the recognised type than to the true one, compared with other trials of the true type.
         """
-        truth, read, known = int(self._quick.truth[trial]), int(self.read[trial]), self._build.grasps
+        truth, read, known = int(self._quick.truth[trial]), self.found.read[trial], self._build.grasps
         # A refused frame has no type, and a build may not know a type.
         if truth == read or not {self.types[truth], self.types[read]} <= {*known}:
             return []
@@ -105,51 +102,58 @@ class ErrorsPage:
 
     def __init__(self, studio: Studio, choose: ChoosePage) -> None:
         self._studio, self._project, self._choose = studio, studio.project, choose
-        self._build: BuildReading | None = None
+        # By the builds' ids and the numbering of the recordings.
+        self._readings = dict[tuple[str, str], BuildReading]()
         requests: dict[str, Handler] = {"errors": self._errors, "trials": self._trials}
         studio.add(requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
 
     def read(self, report: Report) -> None:
-        """Let the build in use recognise the recordings, if it can, and show what was edited."""
-        self._build, name, why = None, "", ""
-        try:
-            if (built := self._project.build()) is not None:
-                self._build, name = BuildReading(built[0].name, built[1], self._choose.recordings.quick), built[0].name
-        except (ThenarError, OSError) as reason:
-            why = f"build {self._project.state.build} is left out: {reason}"
-        self._studio.publish("recogniser", message("recogniser", build=name, why=why))
-        self._tell_edits()
+        """Offer the builds that can recognise the recordings."""
+        self._readings, builds, unused = {}, list[Member](), list[str]()
+        for member in self._project.members("build"):
+            try:
+                manifest = load_manifest(self._project.folder / member.name)
+                select_inputs(self._choose.recordings.quick.held, manifest)
+                builds.append(member)
+            except (ThenarError, OSError) as reason:
+                unused.append(f"build {member.name} is left out: {reason}")
+        self._studio.publish("recognisers", builds=builds, unused=unused)
 
     def _errors(self, asked: Asked) -> bytes:
-        """Return as which type the sensors, or the build, recognise every trial."""
-        now, sensors = self._choose.recordings, asked.sensors
-        quick = now.quick
-        if asked.name == "build":
-            reading = self._reading
-            sensors = reading.sensors
-            about = {"types": reading.types, "read": reading.read.tolist(), **reading.about}
+        """Return as which type the sensors, or the build with an id, recognise every trial."""
+        now, quick = self._choose.recordings, self._choose.recordings.quick
+        if asked.id:
+            reading = self._reading(asked.id)
+            found, types, sensors = reading.found, reading.types, reading.sensors
         else:
-            found = quick.of(sensors)
-            about = {"types": quick.grasps, "read": found.read, "mean": found.mean, "low": found.low}
-            about |= {"high": found.high, "of": f"{found.of}; quick: not nested"}
-        places = quick.places(sensors).tolist()
-        about |= {"truth": quick.truth.tolist(), "places": places, "numbering": now.numbering}
-        return message("errors", about, sensors=sensors, asked=(asked.name, asked.sensors))
+            found, types, sensors = quick.of(asked.sensors), [*quick.grasps], asked.sensors
+        return message(
+            "errors",
+            found,
+            types=types,
+            truth=quick.truth.tolist(),
+            places=quick.places(sensors).tolist(),
+            sensors=sensors,
+            numbering=now.numbering,
+            asked=(asked.id, asked.sensors),
+        )
 
     def _trials(self, asked: Asked) -> bytes:
         """Return the values of sensors in trials, and which decided where one was misread."""
         quick, shown = self._choose.recordings.quick, list[dict[str, object]]()
         typical = {kind: [*map(float, shares)] for kind, shares in zip(quick.grasps, quick.typical, strict=True)}
         for trial in asked.trials[:_MOST_SHOWN]:
-            decisive = self._reading.decisive(trial) if asked.name == "build" else quick.decisive(trial, asked.sensors)
+            decisive = self._reading(asked.id).decisive(trial) if asked.id else quick.decisive(trial, asked.sensors)
             shown.append({"trial": trial, "shown": quick.seen(trial).tolist(), "decisive": decisive})
         return message("trials", trials=shown, typical=typical, asked=asked.trials)
 
-    @property
-    def _reading(self) -> BuildReading:
-        if self._build is None:
-            raise ThenarError("no build of this project recognises these recordings: train one")
-        return self._build
+    def _reading(self, build: str) -> BuildReading:
+        """Return how a build recognises the recordings. Raises ThenarError if there is no such build, or it cannot."""
+        now, readings, path = self._choose.recordings, self._readings, self._project.path("build", build)
+        key = build, now.numbering
+        if key not in readings:
+            readings[key] = BuildReading(path.name, Build.load(path), now.quick)
+        return readings[key]
 
     def _edit(self, asked: Asked) -> None:
         """Make trials another type, leave them out if it is empty, or take the last action back; then read again.
@@ -168,12 +172,4 @@ class ErrorsPage:
             if asked.name not in ("", *now.quick.held.taxonomy.types):
                 raise ThenarError(f"{shortened(repr(asked.name))} is not a grasp type of these recordings")
             change(log, [now.trials[trial] for trial in asked.trials], asked.name)
-        self._tell_edits()
         self._studio.changed()
-
-    def _tell_edits(self) -> None:
-        """Show the last action that can be taken back."""
-        last = last_action(load_edits(self._project.edits)[0])
-        what = counted(len(last), "trial") if len(last) > 1 else named(last[0].of) if last else ""
-        done = f"{what} {f'made {last[0].new}' if last[0].new else 'left out'}" if last else ""
-        self._studio.publish("edits", message("edits", words=done))

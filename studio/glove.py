@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from queue import SimpleQueue
 from threading import Event
 from time import monotonic
 from typing import get_args
@@ -32,7 +31,7 @@ from thenar.runtime.web.server import message
 from .calibrating import PRESS_WORDS, Codes, PressStage, lead_poses, lead_presses
 from .collecting import WAIT_US
 from .sensors import GloveSensors
-from .studio import Asked, Report, Studio, glove_message
+from .studio import Asked, Report, Studio, glove_shown
 
 _LISTEN_S, _HOLD_S, _BAUD = 5.0, 1.0, 115_200
 _SHOW_S, _RATE_S, _PAST_S = 0.2, 1.0, 30.0
@@ -40,7 +39,6 @@ _MOST_KEPT = 3000
 # By this much a value changes when a hand moves, and so often do others while a sensor that stays the same is stuck.
 _LEAST_CHANGE = {"switch": 1, "pad": 10, "joint": 3}
 _CHANGES_OF_OTHERS = {"switch": 20, "pad": 500, "joint": 500}
-_POSE_KEYS: tuple[PoseKey, ...] = get_args(PoseKey)
 _PORTS = ("serial/by-id/*", "ttyUSB*", "ttyACM*")
 _ADVICE = {
     "lost": "cannot be read: check its wire and its place in glove.toml",
@@ -55,7 +53,6 @@ class GlovePage:
 
     def __init__(self, studio: Studio) -> None:
         self._studio, self._project = studio, studio.project
-        self._keys = SimpleQueue[PoseKey]()
         self._proposal = ""
         self._past: Sequence[deque[tuple[float, int | None]]] = ()
         requests: Mapping[str, Callable[[Asked], bytes | None]] = {
@@ -64,7 +61,6 @@ class GlovePage:
             "connect": self._on_connect,
             "past": self._on_past,
             "calibrate": self._on_calibrate,
-            "step": self._on_step,
         }
         studio.add(requests, self.read)
 
@@ -80,9 +76,7 @@ class GlovePage:
             except (ThenarError, OSError) as reason:
                 why = str(reason)
         ports = sorted(str(port) for pattern in _PORTS for port in Path("/dev").glob(pattern))
-        self._studio.publish(
-            "glove-hand", message("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports)
-        )
+        self._studio.publish("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports)
 
     def _sensors(self) -> GloveSensors:
         return GloveSensors(self._project.wiring(), self._project.hand())
@@ -95,7 +89,7 @@ class GlovePage:
         self._studio.station.start("looking", partial(self._find, asked.name))
 
     def _find(self, port: str, stop: Event) -> None:
-        self._studio.publish("found", message("found", port=port, busy=True))
+        self._studio.publish("found", port=port, busy=True)
         text, wrong = "", list[str]()
         try:
             found = propose_stream(port, _BAUD, _LISTEN_S)
@@ -106,7 +100,7 @@ class GlovePage:
         except (ThenarError, OSError) as reason:
             content, wrong = {"columns": (), "rows": 0, "remarks": ()}, [of_device(port, str(reason))]
         self._proposal = "" if wrong else text
-        self._studio.publish("found", message("found", content, port=port, busy=False, text=text, wrong=wrong))
+        self._studio.publish("found", content, port=port, busy=False, text=text, wrong=wrong)
 
     def _on_connect(self, _asked: Asked) -> None:
         """Write the proposed glove.toml."""
@@ -125,7 +119,7 @@ class GlovePage:
             self._show(stop)
         finally:
             # A page that is opened later shows nothing old.
-            self._studio.publish("glove-state", message("glove-state", states=()))
+            self._studio.publish("glove-state", states=())
 
     def _show(self, stop: Event) -> None:
         """Show the state of every sensor, until `stop` is set."""
@@ -166,17 +160,14 @@ class GlovePage:
                         for value, kind, changed, since in zip(shown, kinds, changes, before, strict=True)
                     ]
                     devices = sources.health()
-                    self._studio.publish("glove", glove_message(devices))
+                    self._studio.publish("glove", glove_shown(devices))
                     self._studio.publish(
                         "glove-state",
-                        message(
-                            "glove-state",
-                            sensors.drawn(shown),
-                            states=states,
-                            devices=devices,
-                            rates=rates,
-                            problem=_problem(sensors, states, devices),
-                        ),
+                        sensors.drawn(shown),
+                        states=states,
+                        devices=devices,
+                        rates=rates,
+                        problem=_problem(sensors, states, devices),
                     )
 
     def _on_past(self, asked: Asked) -> bytes:
@@ -194,14 +185,13 @@ class GlovePage:
         work = {"joint": self._calibrate_joints, "pad": self._calibrate_pads}.get(asked.name)
         if work is None or not self._project.harness.exists():
             raise SettingError("joints or pads of a glove.toml can be calibrated")
-        self._keys = SimpleQueue()
-        self._studio.station.start("calibrating", partial(self._calibrate, work))
+        self._studio.station.start("calibrating", partial(self._calibrate, work), get_args(PoseKey))
 
     def _calibrate(self, work: Callable[[Event], None], stop: Event) -> None:
         try:
             work(stop)
         finally:
-            self._studio.publish("calibrating", message("calibrating", step=""))
+            self._studio.publish("calibrating", step="")
 
     def _calibrate_joints(self, stop: Event) -> None:
         def view(guide: PoseGuide) -> list[PoseKey]:
@@ -217,8 +207,8 @@ class GlovePage:
                 "faults": ["The glove is silent."] * silent + [f"{name}: {state}" for name, state in states if state],
                 "keys": {key: what for key, what in words.items() if key in offered},
             }
-            self._studio.publish("calibrating", message("calibrating", content))
-            return self._pressed()
+            self._studio.publish("calibrating", content)
+            return self._studio.station.pressed()
 
         guide = lead_poses(str(self._project.harness), _BAUD, _HOLD_S, view, stop)
         if guide is None:
@@ -238,23 +228,13 @@ class GlovePage:
                 "faults": [f"{name}: not read" for name, count in zip(names, counts, strict=True) if count is None],
                 "keys": {"accept": words[stage]} if stage in words else {},
             }
-            self._studio.publish("calibrating", message("calibrating", content))
-            return "accept" in self._pressed()
+            self._studio.publish("calibrating", content)
+            return "accept" in self._studio.station.pressed()
 
         found = lead_presses(self._project.harness, _HOLD_S, view, stop, self._project.state.wearer)
         if found is not None:
             names, pads = found
             self._written("taxels", "taxels.toml", [line.name for line in pads.taxels], names, pads.to_toml())
-
-    def _pressed(self) -> list[PoseKey]:
-        return [self._keys.get() for _ in range(self._keys.qsize())]
-
-    def _on_step(self, asked: Asked) -> None:
-        if asked.name not in _POSE_KEYS:
-            raise SettingError(f"there is no key {shortened(repr(asked.name))}")
-        if self._studio.station.doing != "calibrating":
-            raise SettingError("nothing is calibrated now")
-        self._keys.put(asked.name)
 
     def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> None:
         """Write a calibration of sensors, and name it in glove.toml."""
@@ -266,7 +246,7 @@ class GlovePage:
         lacking = [name for name in names if name not in found]
         said = f"{file}: {len(found)} of {len(names)} are calibrated"
         said += f"; {list_names(lacking)} did not move" if lacking else ""
-        self._studio.publish("calibrated", message("calibrated", said=said))
+        self._studio.publish("calibrated", said=said)
         self._studio.changed()
 
 

@@ -11,7 +11,6 @@ from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.glove import Glove
 from thenar.runtime.web.live import LivePage
 from thenar.runtime.web.replay import Replay
-from thenar.runtime.web.server import message
 
 from .studio import Asked, Handler, Report, Studio
 
@@ -51,8 +50,8 @@ class StudioLive:
         members = [member for kind in ("recording", "build") for member in project.members(kind)]
         paths = {member.id: quote(str(project.folder / member.name)) for member in members}
         why, built = self._lacking(), project.build()
-        run = "" if built is None else f"thenar run {quote(str(built[0]))} --glove {quote(str(project.harness))} --web"
-        self._studio.publish("live", message("live", paths=paths, run=run, why=why, unread=self._unread))
+        run = "" if built is None else project.command(["run", built[0], "--glove", project.harness, "--web"])
+        self._studio.publish("live", paths=paths, run=run, why=why, unread=self._unread)
 
     def _lacking(self) -> str:
         """Return in a sentence what a run lacks, or ""."""

@@ -6,14 +6,14 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from shlex import join, quote
+from shlex import join
 
 import msgspec
 
 from thenar.compiler.glove.prices import Part, load_prices
 from thenar.compiler.hand import HandShape, load_layout
 from thenar.compiler.recordings import RecordingError
-from thenar.compiler.recordings.edits import TrialId, apply_edits
+from thenar.compiler.recordings.edits import TrialId, apply_edits, trials_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.merging import merge
 from thenar.drivers.errors import SettingError, ThenarError
@@ -115,10 +115,6 @@ class Project:
         """Return the sets in use."""
         return [self.folder / one.name for one in self.members("set") if one.name not in self.state.aside]
 
-    def grasp_set(self) -> GraspSet:
-        """Return the recordings: all sets in use as one, with their edits. Raises ThenarError if there is none."""
-        return self.recordings()[0]
-
     def recordings(self, paths: Sequence[Path] = ()) -> tuple[GraspSet, list[TrialId], list[str]]:
         """Return these sets, or all in use, as one; and for each of its rows the trial as it was recorded.
 
@@ -138,9 +134,12 @@ class Project:
             none = "the project has no recordings yet: record some, or import a table with thenar import"
             raise SettingError("; ".join(unused) or none)
         edits, damaged = load_edits(self.edits)
-        # Those of sets that were left aside wait.
-        aside = {one.name for one in self.members("set")} - sets.keys()
-        grasp_set, trials, missing = apply_edits(sets, [edit for edit in edits if edit.set not in aside])
+        # Those of sets that were left aside wait, and so do those of recordings for trials that get into a set later.
+        there = {trial for name, one in sets.items() for trial in trials_of(name, one)}
+        waiting = {one.name for one in self.members("set")} - sets.keys()
+        waiting |= {f"{Path(one.name).stem}.grasps" for one in self.members("recording")}
+        used = [edit for edit in edits if edit.set not in waiting or edit.of in there]
+        grasp_set, trials, missing = apply_edits(sets, used)
         return grasp_set, trials, [*unused, *missing, *filter(None, [damaged])]
 
     @property
@@ -148,16 +147,18 @@ class Project:
         """The path of the log of edits, which may not be there."""
         return self.folder / "edits.jsonl"
 
-    def joined(self, paths: Sequence[Path]) -> tuple[str, str]:
-        """Return the beginning of a command that makes one set of several and of edits, and the name of the result; if
-        there is nothing to do, "" and the name of the only set.
+    def command(self, words: Sequence[object], sets: Sequence[Path] = (), more: Sequence[object] = ()) -> str:
+        """Return a command of thenar: its first `words`, the sets, and `more`.
+
+        Several sets, and edits of one, are merged by a command before it.
         """
-        if len(paths) == 1 and not self.edits.exists():
-            return "", quote(str(paths[0]))
-        # Next to the project: in it, it would be one more set.
-        whole = str(self.folder.resolve().parent / f"{self.name}.grasps")
-        edits = ["--edits", str(self.edits)] if self.edits.exists() else []
-        return f"{join(['thenar', 'merge', *map(str, paths), *edits, '-o', whole])} && ", quote(whole)
+        first, given = "", [*sets]
+        if sets and (len(sets) > 1 or self.edits.exists()):
+            # Next to the project: in it, it would be one more set.
+            given = [self.folder.resolve().parent / f"{self.name}.grasps"]
+            edits = ["--edits", self.edits] if self.edits.exists() else []
+            first = f"{self.command(['merge', *sets, *edits, '-o', *given])} && "
+        return first + join(map(str, ["thenar", *words, *given, *more]))
 
     @property
     def harness(self) -> Path:

@@ -31,15 +31,14 @@ _MOST_TRIED = 4000
 
 
 class Quick(msgspec.Struct, frozen=True):
-    """The result for some sensors: the accuracy of trials, 0..1, and its 95 % interval, and what it is of; how many
-    trials of each type (rows) were recognised as each (columns); and the number of the recognised type of every trial.
+    """The result for some sensors, or for a build: the accuracy of trials, 0..1, and its 95 % interval, and what it is
+    of; and the number of the recognised type of every trial.
     """
 
     of: str
     mean: float
     low: float
     high: float
-    confusion: tuple[tuple[int, ...], ...]
     read: tuple[int, ...]
 
 
@@ -106,16 +105,7 @@ class QuickAccuracy:
             predicted[fold.test] = self._predicted(fold, columns, fold.test)
         rate = Rate.predicted(predicted, rows.labels, rows.trials, of=self._cut.of, groups=self._cut.groups)
         read = decided(predicted[np.newaxis], self.trial)[0]
-        confusion = np.zeros((len(self.grasps), len(self.grasps)), np.intp)
-        np.add.at(confusion, (self.truth, read), 1)
-        return Quick(
-            of=str(self._cut.of),
-            mean=rate.mean,
-            low=rate.low,
-            high=rate.high,
-            confusion=tuple(map(tuple, confusion.tolist())),
-            read=tuple(read.tolist()),
-        )
+        return Quick(str(self._cut.of), rate.mean, rate.low, rate.high, tuple(read.tolist()))
 
     def best_next(self, sensors: Sequence[int]) -> int | None:
         """Return the sensor that raises the accuracy of rows most; None if all are there.

@@ -1,23 +1,23 @@
 """The page *Record*: guided collections into the project, begun, continued, led, and imported when they end.
 
-It also leads those that are begun on the page *Wearer*, to which a build is then adapted. While one runs, its topics
-are "collecting", the state of the guide, and "trials", what was accepted so far.
+It also leads those that are begun on the page *Wearer*, to which a build is then adapted. Their topics are
+"collecting", the state of the guide, and "trials", what was accepted so far.
 """
 
 import json
 import secrets
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
-from queue import SimpleQueue
-from threading import Event
+from threading import Event, Lock
 
 import numpy as np
 from msgspec.structs import replace
 
 from thenar.compiler.recordings import check_names
-from thenar.compiler.recordings.edits import trials_of
+from thenar.compiler.recordings.edits import TrialId
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.compiler.recordings.taxonomy import ANY, Taxonomy, collected, tasks_of
@@ -26,19 +26,17 @@ from thenar.runtime.calibration import RAW
 from thenar.runtime.files import write_atomically
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.glove import Glove
-from thenar.runtime.names import shortened
 from thenar.runtime.published import NONE, DeviceHealth
 from thenar.runtime.recording.guide import KEYS, CollectionGuide, Journal, Key, Trial, planned, read_journal
-from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label
 from thenar.runtime.web.server import message
 
 from .collecting import collect, standing, task
-from .edits import change, load_edits
+from .edits import change, load_edits, restore
 from .quick import QuickAccuracy
 from .sensors import GloveSensors
-from .studio import Asked, Handler, Report, Studio, glove_message
+from .studio import Asked, Handler, Report, Studio, glove_shown
 from .wearer import WearerPage
 
 _MOST_REPETITIONS = 1000
@@ -55,24 +53,16 @@ class RecordPage:
 
     def __init__(self, studio: Studio, wearer: WearerPage) -> None:
         self._studio, self._project, self._wearer = studio, studio.project, wearer
-        # Of the collection that runs, or was the last: the keys that wait, the frames of its captured trials, what was
-        # shown last (the guide's step and its time, and the accepted trials), its trials, and the set that it became.
-        self._keys: SimpleQueue[Key] | None = None
-        self._captured = dict[int, Frames]()
-        self._shown = -1, 0
-        self._accepted: Sequence[int] | None = None
-        self._trials = dict[int, Trial]()
-        self._recorded: Path | None = None
+        self._sitting: Sitting | None = None
         requests: dict[str, Handler] = {
             "record": self._begin,
             "continue": self._continue,
             "wear": self._wear,
-            "key": self._press,
-            "recorded": self._trial,
+            "recorded": lambda asked: self._last.seen(asked.trial),
             "relabel": self._relabel,
         }
         studio.add(requests, self.read)
-        studio.publish("collecting", message("collecting", stage="over"))
+        studio.publish("collecting", stage="over")
 
     def read(self, report: Report) -> None:
         """Show which recordings can be continued, and what can be recorded."""
@@ -80,20 +70,26 @@ class RecordPage:
             {"id": id_, "name": path.name, "subject": collection.subject, "done": done, "total": total}
             for id_, path, collection, done, total in self._unfinished()
         ]
-        name = "" if self._recorded is None else self._recorded.name
-        latest = {edit.of: edit.new for edit in load_edits(self._project.edits)[0] if edit.of[0] == name}
-        edits = {trial[5]: new for trial, new in latest.items() if new != trial[3]}
-        self._studio.publish("relabelled", message("relabelled", set=name, trials=edits))
+        if self._sitting is not None:
+            self._sitting.tell()
         self._studio.publish(
             "recordings",
-            message(
-                "recordings",
-                unfinished=found,
-                taxonomies=["kamakura14", "cutkosky16", "feix33", "own"],
-                objects=self._objects is not None,
-                glove=self._project.harness.exists(),
-            ),
+            unfinished=found,
+            taxonomies=["kamakura14", "cutkosky16", "feix33", "own"],
+            objects=self._objects is not None,
+            glove=self._project.harness.exists(),
         )
+
+    @property
+    def _last(self) -> "Sitting":
+        """The collection that runs, or was the last. Raises SettingError before the first."""
+        if self._sitting is None:
+            raise SettingError("nothing was recorded here yet: record, or use the page Errors")
+        return self._sitting
+
+    def _relabel(self, asked: Asked) -> None:
+        self._last.relabel(asked.trial, asked.name)
+        self._studio.changed()
 
     def _unfinished(self) -> list[tuple[str, Path, Collection, int, int]]:
         """Return the collections that can be continued: id, path, collection, and trials done, of how many."""
@@ -131,7 +127,7 @@ class RecordPage:
             raise SettingError(types.unknown(unknown[0]))
         tasks = tuple(task for task in tasks if not asked.ids or task.grasp in (*asked.ids, NONE))
         collection = Collection(asked.name, types.name, types.types, tasks, int(repetitions), secrets.randbits(32))
-        self._start("recording", self._project.new_path(asked.name, ".mcap", ".grasps"), collection)
+        self._start(self._project.new_path(asked.name, ".mcap", ".grasps"), collection)
         if asked.name != self._project.state.wearer:
             self._project.remember(wearer=asked.name)
             self._studio.changed()
@@ -146,7 +142,7 @@ class RecordPage:
 
     def _continue(self, asked: Asked) -> None:
         journal = read_journal(self._project.path("recording", asked.id))
-        self._start("recording", journal.path, _collection(journal), journal)
+        self._start(journal.path, _collection(journal), journal)
 
     def _wear(self, asked: Asked) -> None:
         """Begin to record two trials of each type of the build, or three if `name` is a type to add; or go on."""
@@ -160,63 +156,98 @@ class RecordPage:
         wanted = Collection(wearer, types.name, types.types, tasks, often, drawn, checksum)
         for _, path, begun, _, _ in self._unfinished():
             if replace(begun, seed=drawn) == wanted:
-                self._start("wearer", path, begun, read_journal(path))
+                self._start(path, begun, read_journal(path))
                 return
-        self._start("wearer", self._project.new_path(wearer, ".mcap", ".grasps"), wanted)
+        self._start(self._project.new_path(wearer, ".mcap", ".grasps"), wanted)
 
     # A collection, on the thread of the station.
 
-    def _start(self, doing: str, recording: Path, collection: Collection, journal: Journal | None = None) -> None:
-        planned(collection)
-        self._studio.station.start(doing, partial(self._lead, doing, recording, collection, journal))
+    def _start(self, recording: Path, collection: Collection, journal: Journal | None = None) -> None:
+        sitting = Sitting(self._studio, recording, collection, journal)
+        self._studio.station.start("recording", partial(self._lead, sitting), KEYS)
 
-    def _lead(self, doing: str, recording: Path, collection: Collection, journal: Journal | None, stop: Event) -> None:
+    def _lead(self, sitting: "Sitting", stop: Event) -> None:
         """Lead a collection, and write the set of all its accepted trials when it ends."""
-        self._keys = keys = SimpleQueue[Key]()
-        self._shown, self._accepted, self._recorded = (-1, 0), None, None
-        self._captured = {} if journal is None else _captured(recording)
-        self._trials = {trial.number: trial for trial in planned(collection)}
-        self._studio.publish("finished", message("finished", set=""))
-        self._studio.publish("collecting", message("collecting", stage="waiting", doing=doing))
-        view = partial(self._view, doing, keys, Taxonomy(collection.taxonomy, collection.types))
+        self._sitting = sitting
+        self._studio.publish("finished", set="")
         try:
-            try:
-                done = collect(self._project.harness, collection, recording, journal, view, stop)
-            finally:
-                self._keys = None
-                self._studio.publish("collecting", message("collecting", stage="over"))
-            if done:
-                self._write(doing, recording, collection, done)
+            if done := sitting.lead(stop):
+                self._write(sitting, done)
         finally:
             self._studio.changed()
 
-    def _write(self, doing: str, recording: Path, collection: Collection, done: int) -> None:
+    def _write(self, sitting: "Sitting", done: int) -> None:
         """Write the set of the accepted trials.
 
         What was recorded for a build has its codes, on whichever page it was continued. Once it is complete, it adapts
         the build, if it is the wearer's.
         """
+        collection, total = sitting.collection, len(sitting.trials)
         build = self._project.build_of(collection.build)
         codings = None if build is None else build[1].manifest.codings
-        grasp_set, report = import_recordings([recording], codings=codings)
-        output, total = recording.with_suffix(".grasps"), len(self._trials)
-        grasp_set.save(output)
-        if doing == "recording":
-            self._recorded = output
-            warnings = [finding.message for finding in report.warnings]
-            about = {"set": output.name, "size": str(grasp_set.size), "warnings": warnings}
-            self._studio.publish("finished", message("finished", about, done=done, total=total))
+        grasp_set, report = import_recordings([sitting.recording], codings=codings)
+        grasp_set.save(sitting.output)
+        warnings = [finding.message for finding in report.warnings]
+        about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
+        self._studio.publish("finished", about, done=done, total=total)
         if build is not None and done == total and collection.subject == self._project.state.wearer:
-            self._studio.queue("adapt", partial(self._wearer.adapt, [output]))
+            self._studio.queue("adapt", partial(self._wearer.adapt, [sitting.output]))
 
-    def _view(
-        self,
-        doing: str,
-        keys: SimpleQueue[Key],
-        taxonomy: Taxonomy,
-        guide: CollectionGuide,
-        devices: Sequence[DeviceHealth],
-    ) -> list[Key]:
+
+class Sitting:
+    """A collection that is led, and its accepted trials, which can be looked at and edited meanwhile and afterwards.
+
+    The log of edits names a trial as the set does that is written at the end, so an edit waits for that. What became of
+    a trial that is undone is taken back.
+
+    Parameters
+    ----------
+    studio : Studio
+        The studio that leads it.
+    recording : Path
+        Its file.
+    collection, journal
+        As for `collect`.
+
+    Attributes
+    ----------
+    output : Path
+        The set that is written at the end.
+    trials : dict of int to Trial
+        All trials by their numbers.
+
+    Raises
+    ------
+    ThenarError, OSError
+        If there are too many trials, or the glove's files cannot be read.
+    """
+
+    def __init__(self, studio: Studio, recording: Path, collection: Collection, journal: Journal | None) -> None:
+        self._studio, self._project = studio, studio.project
+        self.recording, self.collection, self._journal = recording, collection, journal
+        self.output, self._adapts = recording.with_suffix(".grasps"), bool(collection.build)
+        self.trials = {trial.number: trial for trial in planned(collection)}
+        self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
+        self._sensors = GloveSensors(self._project.wiring(), self._project.hand())
+        # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
+        # step and the time.
+        self._captured = dict[int, Frames]()
+        self._accepted: Sequence[int] | None = None
+        self._shown, self._telling = (-1, 0), Lock()
+
+    def lead(self, stop: Event) -> int:
+        """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
+        self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
+        # Those of the collection before are no longer shown.
+        self._studio.publish("trials", set="", trials=(), types=(), accuracy=None)
+        if self._journal is not None:
+            self._captured = _captured(self.recording)
+        try:
+            return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
+        finally:
+            self._studio.publish("collecting", stage="over")
+
+    def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
         """Show the guide's state ten times a second and at every change; return the keys pressed."""
         now, (step, shown_us) = now_us(), self._shown
         if step != guide.step:
@@ -224,16 +255,16 @@ class RecordPage:
                 self._captured[guide.trial.number] = guide.captured
             if guide.accepted != self._accepted:
                 self._accepted = guide.accepted
-                trials = [self._trials[number] for number in guide.accepted]
-                shown = [(trial.number, trial.grasp, trial.object) for trial in trials]
-                types = list(dict.fromkeys(trial.grasp for trial in self._trials.values()))
-                accuracy = self._accuracy(guide, taxonomy)
-                self._studio.publish("trials", message("trials", trials=shown, types=types, accuracy=accuracy))
+                # What is wrong with the log is said by Choose, and ends no recording.
+                with suppress(ThenarError, OSError):
+                    if restore(self._project.edits, self.output.name, {*self._accepted}):
+                        self._studio.changed()
+                self.tell()
         if step != guide.step or now >= shown_us + _SHOW_US:
             self._shown = guide.step, now
-            prompt, thing = task(guide, taxonomy)
+            prompt, thing = task(guide, self._taxonomy)
             content = {
-                "doing": doing,
+                "adapts": self._adapts,
                 "stage": guide.stage,
                 "number": guide.done + guide.skipped + 1,
                 "grasp": "" if guide.trial is None else guide.trial.grasp,
@@ -246,35 +277,50 @@ class RecordPage:
                 "total": guide.total,
                 "skipped": guide.skipped,
             }
-            self._studio.publish("collecting", message("collecting", content))
-            self._studio.publish("glove", glove_message(devices))
-        return [keys.get() for _ in range(keys.qsize())]
+            self._studio.publish("collecting", content)
+            self._studio.publish("glove", glove_shown(devices))
+        return self._studio.station.pressed()
 
-    def _accuracy(self, guide: CollectionGuide, taxonomy: Taxonomy) -> dict[str, object] | None:
-        """Return the quick accuracy of all sensors in the accepted trials, if there are enough."""
-        session = guide.session
-        trials = [self._trials[number] for number in guide.accepted if self._trials[number].grasp != NONE]
-        counts = Counter(trial.grasp for trial in trials)
-        types = {trial.grasp for trial in self._trials.values()} - {NONE}
+    def tell(self) -> None:
+        """Show the accepted trials, and the accuracy in them, as they were edited."""
+        with self._telling:
+            if self._accepted is None:
+                return
+            trials, made = [self.trials[number] for number in self._accepted], dict[int, str]()
+            with suppress(ThenarError, OSError):
+                edits = load_edits(self._project.edits)[0]
+                made = {edit.trial: edit.new for edit in edits if edit.set == self.output.name}
+            shown = [(trial.number, trial.grasp, trial.object) for trial in trials]
+            types = list(dict.fromkeys(trial.grasp for trial in self.trials.values()))
+            edited = [(trial, made.get(trial.number, trial.grasp)) for trial in trials]
+            accuracy = self._accuracy([one for one in edited if one[1] not in ("", NONE)])
+            about = {"set": self.output.name, "trials": shown, "types": types, "accuracy": accuracy}
+            self._studio.publish("trials", about)
+
+    def _id(self, trial: Trial) -> TrialId:
+        """Return the name of a trial in the log: that in its set, which `import_recordings` makes as one session."""
+        return self.output.name, self.collection.subject, "1", trial.grasp, trial.object, trial.number
+
+    def _accuracy(self, edited: Sequence[tuple[Trial, str]]) -> dict[str, object] | None:
+        """Return the quick accuracy of all sensors in trials of these types, if there are enough."""
+        counts = Counter(grasp for _, grasp in edited)
+        types = {*counts, *(trial.grasp for trial in self.trials.values())} - {NONE}
         if len(types) < 2 or any(counts[grasp] < _LEAST for grasp in types):
             return None
-        frames = [self._captured[trial.number] for trial in trials]
-        codes = [() if glove is None else tuple(glove.sensors) for _, glove in frames]
-        taxels = [[] if switches is None else [code or 0 for code in switches.taxels or ()] for switches, _ in frames]
-        closed = [0 if switches is None else switches.closed for switches, _ in frames]
+        rows = [self._sensors.read(*self._captured[trial.number]) for trial, _ in edited]
+        shown, names = np.array([[value or 0 for value in row] for row in rows]), self._sensors.names
+        switches = self._sensors.kinds.count("switch")
         try:
             grasp_set = GraspSet(
-                switches=switch_matrix(closed, len(session.switches)),
-                switch_names=session.switches,
-                codes=np.array(codes, np.uint16).reshape(len(trials), len(session.sensors)),
-                joints=tuple(Joint(name, RAW, 1, 1.0, 255, 255.0) for name in session.sensors),
-                grasps=np.array([trial.grasp for trial in trials]),
-                taxonomy=taxonomy,
-                subjects=np.array(["me"] * len(trials)),
-                objects=np.array([trial.object for trial in trials]),
-                trials=np.array([trial.number for trial in trials]),
-                taxels=np.array(taxels, np.uint16).reshape(len(trials), len(session.taxels)),
-                taxel_columns=tuple(Joint(name, "counts", 0, 0.0, 1, 1.0) for name in session.taxels),
+                switches=shown[:, :switches] == 1,
+                switch_names=names[:switches],
+                codes=shown[:, switches:].astype(np.uint16),
+                joints=tuple(Joint(name, RAW, 0, 0.0, 1, 1.0) for name in names[switches:]),
+                grasps=np.array([grasp for _, grasp in edited]),
+                taxonomy=self._taxonomy,
+                subjects=np.array(["me"] * len(edited)),
+                objects=np.array([trial.object for trial, _ in edited]),
+                trials=np.array([trial.number for trial, _ in edited]),
             )
             quick = QuickAccuracy(grasp_set)
             found = quick.of(range(len(quick.names)))
@@ -282,35 +328,24 @@ class RecordPage:
             return {"why": str(reason)}
         return {"of": found.of, "mean": found.mean, "low": found.low, "high": found.high}
 
-    # What is asked of a collection.
+    def seen(self, number: int) -> bytes:
+        """Return the captured frames of a trial, as the hand shows them. Raises SettingError if there are none."""
+        if number not in self._captured:
+            raise SettingError(f"trial {number} was not recorded")
+        trial, shown = self.trials[number], self._sensors.read(*self._captured[number])
+        return message("recorded", self._sensors.drawn(shown), trial=number, grasp=trial.grasp, thing=trial.object)
 
-    def _press(self, asked: Asked) -> None:
-        if asked.name not in KEYS:
-            raise ThenarError(f"there is no key {shortened(repr(asked.name))}")
-        if self._keys is None:
-            raise ThenarError("nothing is recorded now")
-        self._keys.put(asked.name)
+    def relabel(self, number: int, new: str) -> None:
+        """Make an accepted trial another type; an empty one leaves it out.
 
-    def _trial(self, asked: Asked) -> bytes:
-        """Return the captured frames of a trial, as the hand shows it."""
-        if asked.trial not in self._captured:
-            raise ThenarError(f"trial {asked.trial} was not recorded")
-        sensors = GloveSensors(self._project.wiring(), self._project.hand())
-        trial, shown = self._trials[asked.trial], sensors.read(*self._captured[asked.trial])
-        return message("recorded", sensors.drawn(shown), trial=trial.number, grasp=trial.grasp, thing=trial.object)
-
-    def _relabel(self, asked: Asked) -> None:
-        """Make a trial of the set that was just recorded another type; an empty name leaves it out."""
-        if self._recorded is None:
-            raise SettingError("nothing was recorded here yet: end the recording first, or use the page Errors")
-        grasp_set = GraspSet.load(self._recorded)
-        trials = {trial[5]: trial for trial in trials_of(self._recorded.name, grasp_set)}
-        if asked.trial not in trials:
-            raise SettingError(f"trial {asked.trial} is not in {self._recorded.name}")
-        if asked.name not in ("", *grasp_set.taxonomy.types):
-            raise SettingError(grasp_set.taxonomy.unknown(asked.name))
-        change(self._project.edits, [trials[asked.trial]], asked.name)
-        self._studio.changed()
+        Raises SettingError for another trial or type, and as `change` does.
+        """
+        if number not in (self._accepted or ()):
+            raise SettingError(f"trial {number} is not among those that were accepted")
+        for grasp in filter(None, (self.trials[number].grasp, new)):
+            if grasp not in self._taxonomy.types:
+                raise SettingError(self._taxonomy.unknown(grasp))
+        change(self._project.edits, [self._id(self.trials[number])], new)
 
 
 @lru_cache(maxsize=1024)

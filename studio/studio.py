@@ -2,7 +2,8 @@
 
 A page asks with a message: `do` names the request, other fields its values. A request is carried out on the server's
 thread if it takes milliseconds. Longer work is queued and done one at a time, by `run`; its progress is the topic
-"work". The devices of the glove have one user at a time, whose thread the `Station` keeps.
+"work", its result that of the request's name. The devices of the glove have one user at a time, whose thread the
+`Station` keeps.
 """
 
 import logging
@@ -20,10 +21,12 @@ import msgspec
 
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import SettingError, ThenarError
+from thenar.runtime.names import shortened
 from thenar.runtime.published import DeviceHealth
 from thenar.runtime.web.live import shell_message
-from thenar.runtime.web.server import Message, Server, message
+from thenar.runtime.web.server import Server, message
 
+from .edits import edits_shown
 from .project import Project
 
 PAGES = Path(__file__).parent / "pages"
@@ -35,13 +38,9 @@ _MOST_QUEUED = 8
 _LOOK_S = 0.2
 # What is said of devices is old after this time.
 _LASTS_S = 2.0
-# What ends what else uses the glove; a recording is only ended on its page.
-_WATCHING = ("watching", "looking", "calibrating")
-_ENDED_BY: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys((*_WATCHING, "live"), _WATCHING),
-    **dict.fromkeys(("recording", "wearer"), (*_WATCHING, "live")),
-}
+# How far work is: how much is done, and of how much. Work that was asked for returns the fields of its result.
 Report = Callable[[int, int], None]
+Job = Callable[[Report], Mapping[str, object] | None]
 
 _log = logging.getLogger("thenar")
 
@@ -67,7 +66,8 @@ class Asked(msgspec.Struct, frozen=True):
     numbers: tuple[int, ...] = ()
 
 
-Handler = Callable[[Asked], bytes | None]
+# What carries out a request returns a reply to the page, or work to queue, whose result all pages get.
+Handler = Callable[[Asked], bytes | Job | None]
 
 
 class Studio(Closing):
@@ -101,13 +101,16 @@ class Studio(Closing):
         self, project: Project, address: str, *, token: str | None, jobs: int = -1, page: str = "choose"
     ) -> None:
         self.project, self.jobs = project, jobs
-        self._requests: dict[str, Handler] = {"cancel": self._cancel}
+        self._requests: dict[str, Handler] = {
+            "cancel": self._cancel,
+            "key": lambda asked: self.station.press(asked.name),
+        }
         self._readers = list[Callable[[Report], None]]()
-        self._queue = SimpleQueue[tuple[str, Callable[[Report], None]]]()
+        self._queue = SimpleQueue[tuple[str, Job]]()
         self._stale = False
         self._began_s, self._cancelled = 0.0, False
         self.server = Server(page, address, token=token, on_message=self._take, folder=PAGES)
-        self.station = Station(self.server.publish)
+        self.station = Station(self.publish)
         self.closing = ExitStack()
 
     def add(self, requests: Mapping[str, Handler], read: Callable[[Report], None] | None = None) -> None:
@@ -118,12 +121,12 @@ class Studio(Closing):
         self._requests |= requests
         self._readers += [] if read is None else [read]
 
-    def publish(self, topic: str, made: Message) -> None:
-        """Make this the newest message of its topic."""
-        self.server.publish(topic, made)
+    def publish(self, topic: str, content: object = None, **more: object) -> None:
+        """Make these fields, as `message` takes them, the newest message of a topic."""
+        self.server.publish(topic, message(topic, content, **more))
 
-    def queue(self, what: str, work: Callable[[Report], None]) -> None:
-        """Do this later: `work` gets a function that takes how much is done, and of how much.
+    def queue(self, what: str, work: Job) -> None:
+        """Do this later, and publish its result as the message `what`.
 
         Raises ThenarError if too much waits already.
         """
@@ -132,13 +135,17 @@ class Studio(Closing):
         self._queue.put((what, work))
 
     def changed(self) -> None:
-        """Show the project as it is now, after a set or a build came, went or changed."""
+        """Show the project as it is now, after a set or a build came, went or changed, or trials were edited."""
         about, state = tuple[Any, ...](), self.project.state
         # What is wrong with a build is said by the pages that read it.
         with suppress(ThenarError, OSError):
             built = self.project.build()
             about = () if built is None else (built[0], built[1].manifest)
-        self.publish("shell", shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer))
+        # And what is wrong with the log of edits, by Choose.
+        with suppress(ThenarError, OSError):
+            self.publish("edits", edits_shown(self.project.edits))
+        shell = shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer)
+        self.server.publish("shell", shell)
         self._show_members()
         # Of several changes the last is read: a recording or a build may come while another is read.
         if not self._stale:
@@ -167,8 +174,10 @@ class Studio(Closing):
             self._began_s, self._cancelled = monotonic(), False
             try:
                 report(0, 1)
-                work(report)
-                self.publish("work", message("work", done=1, total=1, what=what))
+                made = work(report)
+                if made is not None:
+                    self.publish(what, made)
+                self.publish("work", done=1, total=1, what=what)
                 if what != "reading":
                     took = round(monotonic() - self._began_s, 1)
                     # A folder that cannot be written to is read all the same.
@@ -176,7 +185,7 @@ class Studio(Closing):
                         self.project.remember(took=self.project.state.took | {what: took})
                     self._show_members()
             except Exception as reason:
-                self.publish("work", message("work", done=0, total=0, why=_sentence(reason)))
+                self.publish("work", done=0, total=0, why=_sentence(reason))
 
     def close(self) -> None:
         """End what uses the glove, and close the pages."""
@@ -186,7 +195,7 @@ class Studio(Closing):
 
     def _show_members(self) -> None:
         kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
-        self.publish("project", message("project", kinds, state=self.project.state))
+        self.publish("project", kinds, state=self.project.state)
 
     def _report(self, what: str, done: int, total: int) -> None:
         """Tell how far the work is, and how long it takes still: as its parts so far, or as the last time, if known.
@@ -197,7 +206,7 @@ class Studio(Closing):
             raise ThenarError("cancelled")
         spent, last = monotonic() - self._began_s, self.project.state.took.get(what)
         left = spent / done * (total - done) if done else None if last is None else max(last - spent, 0.0)
-        self.publish("work", message("work", done=done, total=total, what=what, left_s=left))
+        self.publish("work", done=done, total=total, what=what, left_s=left)
 
     def _cancel(self, _: Asked) -> None:
         """End the work at its next report."""
@@ -213,9 +222,13 @@ class Studio(Closing):
         if handler is None:
             raise ThenarError(f"a page cannot {asked.do[:20]!r}")
         try:
-            return handler(asked)
+            made = handler(asked)
         except OSError as reason:  # the folder is read-only, full or gone
             raise ThenarError(str(reason)) from None
+        if not callable(made):
+            return made
+        self.queue(asked.do, made)
+        return None
 
 
 class Station:
@@ -224,28 +237,40 @@ class Station:
     Parameters
     ----------
     publish : callable
-        As `Server.publish`. The topic "station" says what uses the glove, and why it ended.
+        As `Studio.publish`. The topic "station" says what uses the glove, and why it ended.
     """
 
-    def __init__(self, publish: Callable[[str, Message], None]) -> None:
+    def __init__(self, publish: Callable[..., None]) -> None:
         self._publish, self._stop = publish, Event()
         self._thread: Thread | None = None
+        self._keys, self._pressed = tuple[str, ...](), SimpleQueue[str]()
         self.doing = ""
         self._tell("")
 
-    def start(self, doing: str, work: Callable[[Event], None]) -> None:
+    def start(self, doing: str, work: Callable[[Event], None], keys: Sequence[str] = ()) -> None:
         """End what uses the glove, and then start this: `work` gets an event that is set when it is to end.
 
-        Returns at once: a device may take seconds to end. Raises SettingError if the glove is used for something that
-        this may not end.
+        It takes these `keys`, which pages press. Returns at once: a device may take seconds to end. Raises SettingError
+        during a recording, which is only ended on its page.
         """
-        if self.doing and self.doing not in _ENDED_BY[doing]:
-            raise SettingError(f"the glove is in use: {self.doing}; end that first")
+        if self.doing == "recording":
+            raise SettingError("the glove is in use: recording; end that first")
         self._stop.set()
         self._stop, self.doing = Event(), doing
+        self._keys, self._pressed = tuple(keys), SimpleQueue()
         follow = partial(self._run, doing, work, self._stop, self._thread)
         self._thread = Thread(target=follow, name=f"thenar {doing}", daemon=True)
         self._thread.start()
+
+    def press(self, key: str) -> None:
+        """Press a key for what uses the glove. Raises SettingError if it does not take this."""
+        if key not in self._keys:
+            raise SettingError(f"there is no key {shortened(repr(key))} now")
+        self._pressed.put(key)
+
+    def pressed(self) -> list[Any]:
+        """Return the keys that were pressed since the last call."""
+        return [self._pressed.get() for _ in range(self._pressed.qsize())]
 
     def stop(self) -> None:
         """Let what uses the glove end soon."""
@@ -268,13 +293,13 @@ class Station:
         except Exception as reason:
             why = _sentence(reason)
         if stop is self._stop:
-            self.doing = ""
+            self.doing, self._keys = "", ()
         self._tell(self.doing, why)
 
     def _tell(self, doing: str, why: str = "") -> None:
-        self._publish("station", message("station", doing=doing, why=why))
+        self._publish("station", doing=doing, why=why)
         if not doing:
-            self._publish("glove", message("glove", {"is": "warn", "words": "not in use"}))
+            self._publish("glove", {"is": "warn", "words": "not in use"})
 
 
 def _sentence(reason: Exception) -> str:
@@ -286,7 +311,7 @@ def _sentence(reason: Exception) -> str:
     return f"a bug in thenar: {type(reason).__name__}"
 
 
-def glove_message(devices: Sequence[DeviceHealth]) -> bytes:
-    """Return the message on the bar about the state of the glove's devices."""
+def glove_shown(devices: Sequence[DeviceHealth]) -> dict[str, object]:
+    """Return the fields of the message on the bar about the state of the glove's devices."""
     lost = ", ".join(f"{device.name} lost" for device in devices if not device.connected)
-    return message("glove", {"is": "bad" if lost else "good", "words": lost or "connected"}, lasts_s=_LASTS_S)
+    return {"is": "bad" if lost else "good", "words": lost or "connected", "lasts_s": _LASTS_S}

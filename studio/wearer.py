@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from shlex import join, quote
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from thenar.runtime.names import list_names
 from thenar.runtime.published import NONE
 from thenar.runtime.web.server import message
 
-from .studio import Asked, Handler, Report, Studio
+from .studio import Asked, Handler, Job, Report, Studio
 
 
 class WearerPage:
@@ -34,7 +33,7 @@ class WearerPage:
         requests: dict[str, Handler] = {
             "wearer": self._name,
             "chosen": self._chosen,
-            "adapt": self._later,
+            "adapt": self._job,
             "unwear": self._undo,
         }
         studio.add(requests, self.read)
@@ -46,7 +45,7 @@ class WearerPage:
         try:
             base, build = self.base()
         except ThenarError as reason:
-            self._studio.publish("wearing", message("wearing", about, why=str(reason), sets=()))
+            self._studio.publish("wearing", about, why=str(reason), sets=())
             return
         members = self._project.members("set")
         sets = []
@@ -56,11 +55,11 @@ class WearerPage:
             if grasp_set is not None:
                 sets.append({"id": member.id, "name": member.name, "size": str(grasp_set.size)})
         types = [grasp for grasp in build.grasps if grasp != NONE]
-        record = ["thenar", "record", "--glove", str(self._project.harness), "--for", str(base)]
-        record += ["--subject", state.wearer, "-o", str(self._project.new_path(state.wearer, ".grasps", ".mcap"))]
+        record = ["record", "--glove", self._project.harness, "--for", base, "--subject", state.wearer]
+        record += ["-o", self._project.new_path(state.wearer, ".grasps", ".mcap")]
         about |= {"base": base.name, "types": types, "sets": sets, "glove": self._project.harness.exists()}
-        about |= {"build": state.build, "undo": self._former, "record": join(record)}
-        self._studio.publish("wearing", message("wearing", about, why=""))
+        about |= {"build": state.build, "undo": self._former, "record": self._project.command(record)}
+        self._studio.publish("wearing", about, why="")
 
     def base(self) -> tuple[Path, Build]:
         """Return the build of everybody: the one in use, or that which was adapted to become it. Raises ThenarError."""
@@ -121,28 +120,27 @@ class WearerPage:
         known = int(np.count_nonzero(trained_on(build.manifest, trials)))
         notes = [f"new types are added: {list_names(added)}"] if added else []
         notes += [f"{known} of these trials are of the build's training: before is too good"] if known else []
-        first, recordings = self._project.joined(paths)
-        more = "".join(f" --add-type {quote(name)}" for name in added)
-        output = quote(str(self._project.new_path(self._project.state.wearer)))
-        command = f"{first}thenar adapt {quote(str(base))} {recordings}{more} -o {output}"
+        more = [word for name in added for word in ("--add-type", name)]
+        more += ["-o", str(self._project.new_path(self._project.state.wearer))]
+        command = self._project.command(["adapt", base], paths, more)
         return message("chosen", ids=asked.ids, counts=counts, notes=notes, command=command)
 
     # The build.
 
-    def _later(self, asked: Asked) -> None:
+    def _job(self, asked: Asked) -> Job:
         paths = self._sets(asked)
         self.base()
-        self._studio.queue("adapt", partial(self.adapt, paths))
+        return partial(self.adapt, paths)
 
-    def adapt(self, paths: Sequence[Path], _: Report) -> None:
-        """Adapt the build of everybody to trials, put the result into use, and tell all pages what it is worth."""
+    def adapt(self, paths: Sequence[Path], _: Report) -> dict[str, object]:
+        """Adapt the build of everybody to trials, put the result into use, and return its accuracy."""
         base, build = self.base()
         trials, added = self._trials(paths, build)
         output = self._project.new_path(self._project.state.wearer)
         made = adapt(base, trials, output=output, add_type=added)
         self._project.remember(build=output.name, former=self._project.state.build)
-        self._studio.publish("adapted", message("adapted", _result(made)))
         self._studio.changed()
+        return _result(made)
 
     def _undo(self, asked: Asked) -> None:
         if not self._former:

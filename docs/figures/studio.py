@@ -26,6 +26,10 @@ SCENE, GRASPS, PATIENCE_S = "quick", 20, 120
 _READY = """const found = /segment (\\d+), held for ([\\d.]+)/.exec(document.getElementById('segment').textContent);
     const well = document.getElementById('health').textContent === 'ok';
     return well && found !== null && Number(found[1]) > arguments[0] && Number(found[2]) >= 0.5"""
+# The height of the whole sections on the screen: below, no section is cut.
+_WHOLE = """const boxes = [...document.querySelectorAll('main section')].map((one) => one.getBoundingClientRect());
+    const whole = (end) => end <= innerHeight && boxes.every(({ top, bottom }) => top >= end || bottom <= end);
+    return Math.ceil(Math.max(...boxes.map(({ bottom }) => bottom).filter(whole))) + 10"""
 
 
 @contextmanager
@@ -89,7 +93,8 @@ def main() -> None:
         try:
             scheme = {"name": "prefers-color-scheme", "value": "dark" if options.dark else "light"}
             driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
-            sized = {"width": options.width, "height": 1000, "deviceScaleFactor": 1, "mobile": options.width < 600}
+            height = 1000 if options.choose else 1200
+            sized = {"width": options.width, "height": height, "deviceScaleFactor": 1, "mobile": options.width < 600}
             driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
             driver.get(url)
             wait = WebDriverWait(driver, PATIENCE_S, poll_frequency=0.05)
@@ -97,11 +102,10 @@ def main() -> None:
                 choose_sensors(driver, wait)
             else:
                 wait.until(lambda _: driver.execute_script(_READY, GRASPS))
-                sized["height"] = driver.execute_script("return document.body.scrollHeight")
-                driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", sized)
-                wait.until(lambda _: driver.execute_script(_READY, GRASPS))
+            height = driver.execute_script(_WHOLE)
             with Image.open(BytesIO(driver.get_screenshot_as_png())) as taken:
-                taken.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(options.picture, optimize=True)
+                picture = taken.convert("RGB").crop((0, 0, options.width, height))
+                picture.quantize(64, dither=Image.Dither.NONE).save(options.picture, optimize=True)
         finally:
             driver.quit()
 

@@ -24,6 +24,12 @@ export function percent(share) {
   return (100 * share).toFixed(1);
 }
 
+/** Return the time of a scan of sensors, in words. */
+export function scanTime(us) {
+  if (us === null) return "unknown: they are more than the chips of one bus read";
+  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
+}
+
 /**
  * List members {id, text, checked} as boxes, whose values are the ids. Boxes that stay keep the focus and what a user
  * ticked.
@@ -41,17 +47,23 @@ export const ticked = (element) => [...element.querySelectorAll(":checked")].map
  * Show the keys that count now as buttons, the usual one first, with their letters if they have some.
  * @returns {?HTMLButtonElement} the first one, or null if the keys are those of before
  */
-export function showKeys(keys, press, letters = {}) {
+export function showKeys(keys, ask, letters = {}) {
   const words = Object.entries(keys), said = words.map(String).join();
   if (said === ($("keys").dataset.keys ?? "")) return null;
   $("keys").dataset.keys = said;
   const buttons = words.map(([key, what], at) => {
-    const made = button(what, () => press(key), { class: at ? "plain" : "", "data-key": key });
+    const made = button(what, () => ask("key", { name: key }), { class: at ? "plain" : "", "data-key": key });
     if (letters[key]) made.append(make("kbd", {}, letters[key]));
     return made;
   });
   $("keys").replaceChildren(...buttons);
   return buttons[0] ?? null;
+}
+
+/** Show the last edit of trials, which can be undone. */
+export function showLastEdit(words) {
+  $("undo").disabled = !words;
+  say($("edited"), words && `Last edit: ${words}.`);
 }
 
 /** Show what was trained. */

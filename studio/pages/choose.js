@@ -1,5 +1,5 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { interval, listBoxes, percent, storeChoice, storedChoice, trained } from "./choice.js";
+import { interval, listBoxes, percent, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
 import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
@@ -20,7 +20,7 @@ const ask = openPage({
       ask("use", { id: target.value, value: Number(target.checked) });
     });
     sets.forEach(({ name }, at) => ($("sets").children[at].control.checked = !aside.includes(name)));
-    const known = ["reading", "measure", "curve", "train"].filter((what) => took[what] !== undefined);
+    const known = ["measure", "curve", "train"].filter((what) => took[what] !== undefined);
     say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");
   },
   set: (message) => {
@@ -35,12 +35,9 @@ const ask = openPage({
     $("with-set").hidden = Boolean(set.why);
     if (set.why) return;
     listSensors();
+    $("drawn").hidden = !set.hand.switches.length;
+    hand = drawHand($("hand"), set.hand, { onSwitch: (sensor) => toggle(sensor) });
     choose(storedChoice(set.sensors));
-  },
-  sensors: (drawn) => {
-    $("drawn").hidden = !drawn.switches.length;
-    hand = drawHand($("hand"), drawn, { onSwitch: (sensor) => toggle(sensor) });
-    mark();
   },
   quick: (reply) => {
     if (isChosen(reply.sensors)) show(reply);
@@ -77,9 +74,8 @@ function choose(sensors) {
 
 /** Show which sensors are chosen, on the hand and in the list. */
 function mark() {
-  if (!set) return;
   const bits = set.sensors.map((_, sensor) => chosen.includes(sensor));
-  hand?.setClosed(bits);
+  hand.setClosed(bits);
   boxes.forEach((box, sensor) => (box.checked = bits[sensor]));
 }
 
@@ -109,28 +105,11 @@ function show(reply) {
   const change = before && before.sensors.length !== chosen.length ? 100 * (reply.mean - before.mean) : null;
   const moved = change === null ? "" : `; ${change >= 0 ? "+" : ""}${change.toFixed(1)} points by the last click`;
   say($("change"), `trials, ${reply.of}; quick: not nested, and chosen while looking at it${moved}`);
-  say($("weakest"), weakest(reply));
+  say($("weakest"), reply.weakest);
   say($("command"), reply.command || "choose a sensor");
   say($("spoken"), `${chosen.length} sensors, ${percent(reply.mean)} percent`);
   $("measure").disabled = $("train").disabled = !chosen.length;
   certify();
-}
-
-function scanTime(us) {
-  if (us === null) return "unknown: they are more than the chips of one bus read";
-  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
-}
-
-function weakest({ confusion: counts }) {
-  let worst = null;
-  counts.forEach((row, truth) =>
-    row.forEach((count, read) => {
-      if (truth !== read && count > (worst?.count ?? 0)) worst = { count, truth, read };
-    }),
-  );
-  if (!worst) return "none";
-  const total = counts[worst.truth].reduce((sum, count) => sum + count, 0);
-  return `${set.grasps[worst.truth]} recognised as ${set.grasps[worst.read]}: ${worst.count} of ${total} trials`;
 }
 
 /** Show the accuracy that was measured for the chosen sensors, if it was. */

@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { listBoxes, percent, ticked } from "./choice.js";
+import { listBoxes, percent, scanTime, ticked } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -9,10 +9,7 @@ import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 const SIGNS = { both: "M0-4L4 0L0 4L-4 0Z", a: "M-4-3H4L0 4Z", b: "M-4 3H4L0-4Z" };
 
 const ask = openPage({
-  open: () => {
-    commands();
-    comparison();
-  },
+  open: () => commands(),
   project: ({ builds, sets, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
@@ -20,47 +17,41 @@ const ask = openPage({
     $("no-build").hidden = builds.length > 0;
     // They are compared on all sets unless some are unticked.
     listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name, checked: !state.aside.includes(name) })), changed);
-    $("report").disabled = $("firmware").disabled = !builds.length;
+    $("compare").disabled = $("report").disabled = $("firmware").disabled = !builds.length;
     commands();
-    comparison();
   },
   targets: ({ targets }) => {
     fillMenu($("target"), targets.map(([id, help]) => ({ id, name: `${id}: ${help}` })), targets[0][0]);
     commands();
   },
-  commands: ({ report, firmware }) => {
-    say($("report-command"), report);
-    say($("firmware-command"), firmware);
+  commands: (commands) => {
+    for (const what of ["compare", "report", "firmware"]) say($(`${what}-command`), commands[what]);
+    $("compare").disabled = !commands.compare;
   },
-  comparison: ({ command }) => say($("compare-command"), command),
   compare: (compared) => {
     if (String(compared.ids) === String(request())) show(compared);
   },
-  exported: ({ said, address, name }) => {
-    say($("exported"), said);
-    $("download").hidden = false;
-    const link = $("download").firstChild;
-    link.href = address;
-    link.download = name;
-    say(link, `Save ${name}`);
-    commands();
-  },
+  report: (made) => exported(made),
+  firmware: (made) => exported(made),
 });
 
 const request = () => [$("a").value, $("b").value, ...ticked($("sets"))];
 
-/** Ask for the command that compares; what was compared before is another matter. */
-function comparison() {
-  $("compare").disabled = request().length < 3 || $("a").value === $("b").value;
-  say($("compare-command"), "");
-  if (!$("compare").disabled) ask("comparison", { ids: request() });
-}
-
+/** Ask for the commands that do what the buttons do. */
 function commands() {
-  if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value });
+  if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value, ids: request() });
 }
 
-const scan = (us) => (us === null ? "unknown" : us ? `${us.toFixed(0)} µs` : "none is read");
+function exported({ said, address, name }) {
+  say($("exported"), said);
+  $("download").hidden = false;
+  const link = $("download").firstChild;
+  link.href = address;
+  link.download = name;
+  say(link, `Save ${name}`);
+  commands();
+}
+
 const points = (share) => `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
 
 function show({ builds, hand, both, only, found, said, unused }) {
@@ -70,7 +61,7 @@ function show({ builds, hand, both, only, found, said, unused }) {
   const rows = [
     ["Recognised of these trials", ({ right, ends }) => `${percent(right / found.trials)} % [${ends.map(percent).join(", ")}]`],
     ["Sensors", (build) => build.sensors],
-    ["Scan of switches and pads", (build) => scan(build.scan_us)],
+    ["Scan of switches and pads", (build) => scanTime(build.scan_us)],
     ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
     ["Accuracy as compiled", (build) => build.stated],
     ...(builds[0].price === null ? [] : [["Price", ({ price }) => price.toFixed(2)]]),
@@ -116,9 +107,10 @@ function overlay(hand, kept, builds) {
   $("legend").replaceChildren(...entries);
 }
 
+/** What was compared before is another matter. */
 function changed() {
   $("result").hidden = true;
-  comparison();
+  commands();
 }
 
 for (const id of ["a", "b"]) $(id).addEventListener("change", changed);

@@ -1,5 +1,5 @@
 // The page Errors: which trials are misread, in a matrix and on a map; the selected ones as small hands; and their edits.
-import { interval, storedChoice } from "./choice.js";
+import { interval, showLastEdit, storedChoice } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { TrialMap } from "./map.js";
 import { openPage } from "./shell.js";
@@ -10,8 +10,8 @@ const percent = (share) => `${Math.round(100 * share)} %`;
 const STEP = 24; // the number of trials that are shown at a time
 
 let set = null; // the message on the set
-let drawn = null; // the message on the hand
 let reply = null; // what the recogniser makes of every trial
+let of = "chosen"; // and which recogniser that is
 let styles = new Map();
 let errors = []; // numbers of misread trials
 let last = -1; // the last of them that was shown
@@ -38,22 +38,20 @@ const ask = openPage({
     select([]);
     look();
   },
-  sensors: (message) => (drawn = message),
-  recogniser: ({ build, why }) => {
-    const option = $("of").querySelector("[value=build]") ?? new Option("", "build");
-    option.textContent = `build ${build}`;
-    if (build) $("of").append(option);
-    else option.remove();
-    if (set && !set.why) list($("unused"), [...set.unused, ...(why ? [why] : [])]);
-    if (set && !set.why) look();
+  recognisers: ({ builds, unused }) => {
+    const options = [...$("of").options].slice(0, 2).map(({ value, text }) => ({ id: value, name: text }));
+    fillMenu($("of"), [...options, ...builds.map(({ id, name }) => ({ id, name: `build ${name}` }))], options[0].id);
+    if (!set || set.why) return;
+    list($("unused"), [...set.unused, ...unused]);
+    look();
   },
-  edits: ({ words }) => {
-    $("undo").disabled = !words;
-    say($("edited"), words && `Last edit: ${words}.`);
-  },
+  edits: ({ words }) => showLastEdit(words),
   work: ({ done, total, what }) => {
     const busy = done < total && what !== "reading";
     say($("busy"), busy ? "Edits are shown here when the work that goes on is finished." : "");
+  },
+  refused: ({ do: what }) => {
+    if (what === "errors") $("of").value = of;
   },
   errors: (message) => {
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
@@ -66,14 +64,16 @@ const ask = openPage({
   },
 });
 
+/** Return the id of the build, or "", and the numbers of the sensors that are to recognise. */
 function request() {
-  const of = $("of").value, every = set.sensors.map((_, sensor) => sensor);
-  return [of, of === "all" ? every : of === "chosen" ? storedChoice(set.sensors) : []];
+  const { value } = $("of");
+  if (value === "chosen") return ["", storedChoice(set.sensors)];
+  return value === "all" ? ["", set.sensors.map((_, sensor) => sensor)] : [value, []];
 }
 
 function look() {
-  const [name, sensors] = request();
-  ask("errors", { name, sensors });
+  const [id, sensors] = request();
+  ask("errors", { id, sensors });
 }
 
 const type = (number) => reply.types[number];
@@ -86,10 +86,12 @@ function named(trial) {
 
 function show(message) {
   reply = message;
+  of = $("of").value;
   errors = reply.truth.flatMap((_, trial) => (misread(trial) ? [trial] : []));
   say($("rate"), interval(reply));
   const using = reply.sensors.length ? `${reply.sensors.length} sensors` : "no sensor: choose some on the page Choose";
-  say($("about"), `${reply.of}; ${using}; ${errors.length} of ${reply.truth.length} trials misread`);
+  const quick = reply.asked[0] ? "" : "; quick: not nested";
+  say($("about"), `${reply.of}${quick}; ${using}; ${errors.length} of ${reply.truth.length} trials misread`);
   for (const id of ["next", "previous", "all-errors"]) $(id).disabled = !errors.length;
   const trials = reply.types.map(() => []);
   reply.truth.forEach((truth, trial) => trials[truth].push(trial));
@@ -141,7 +143,6 @@ function select(trials) {
   $("selected").hidden = !trials.length;
   $("trials").replaceChildren();
   mark();
-  watcher.disconnect();
   if (!trials.length) return;
   const proposed = type(pairOf(trials)[1] ?? reply.truth[trials[0]]);
   $("type").value = set.types.includes(proposed) ? proposed : set.types[0];
@@ -153,7 +154,7 @@ function select(trials) {
 function askFor(from) {
   asked = selected.slice(from, from + STEP);
   $("show-more").hidden = selected.length <= from + STEP;
-  ask("trials", { name: $("of").value, sensors: reply.sensors, trials: asked });
+  ask("trials", { id: reply.asked[0], sensors: reply.sensors, trials: asked });
 }
 
 /** Return the numbers of the selected trials whose box is checked, shown or not. */
@@ -213,33 +214,21 @@ function card({ trial, shown, decisive }, typical) {
 function hand(shown, decisive, words) {
   const used = new Set(reply.sensors), first = set.sensors.length - set.joints.length;
   const joints = set.joints.filter(({ joint }) => used.has(first + joint));
-  const switches = drawn.switches.filter(({ bit }) => used.has(bit));
+  const switches = set.hand.switches.filter(({ bit }) => used.has(bit));
   if (!switches.length && !joints.length) return [];
-  const svg = draw("svg", { role: "img", "aria-label": `hand: ${words}` });
-  // Drawn when it is nearly on the screen: before, it has no width, and thousands would take long.
-  watcher.observe(svg);
-  svg.paint = () => {
-    const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
-    const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
-    const { setClosed, setPose } = drawHand(svg, { ...drawn, ...outline, switches, joints: plain });
-    setClosed(shown.map((share) => share > 0.5));
-    setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
-    const names = decisive.map((sensor) => set.sensors[sensor].name);
-    for (const spot of svg.querySelectorAll(".spot")) {
-      spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
-    }
-    svg.setAttribute("aria-label", `hand: ${words}`);
-  };
+  const svg = draw("svg");
+  const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
+  const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
+  const { setClosed, setPose } = drawHand(svg, { ...set.hand, ...outline, switches, joints: plain });
+  setClosed(shown.map((share) => share > 0.5));
+  setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
+  const names = decisive.map((sensor) => set.sensors[sensor].name);
+  for (const spot of svg.querySelectorAll(".spot")) {
+    spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
+  }
+  svg.setAttribute("aria-label", `hand: ${words}`);
   return [svg];
 }
-
-const watcher = new IntersectionObserver((entries) => {
-  for (const { target, isIntersecting } of entries) {
-    if (!isIntersecting) continue;
-    watcher.unobserve(target);
-    target.paint();
-  }
-}, { rootMargin: "300px" });
 
 /* ---- What the page is asked for ---- */
 

@@ -171,7 +171,7 @@ function showStep({ step, what, problems, faults, keys }) {
   say($("what"), what);
   list($("problems"), problems);
   list($("faults"), faults);
-  showKeys(keys, (name) => ask("step", { name }))?.focus();
+  showKeys(keys, ask)?.focus();
 }
 
 $("form").addEventListener("submit", (event) => {

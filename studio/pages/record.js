@@ -1,5 +1,5 @@
 // The page Record: a collection is begun, led key by key, and ends with a set.
-import { percent, showKeys, trained } from "./choice.js";
+import { percent, showKeys, showLastEdit, trained } from "./choice.js";
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
@@ -12,15 +12,15 @@ const query = new URLSearchParams(location.search);
 const only = query.getAll("type"); // types of which the page Errors asks for more; none: all are recorded
 
 let stage = "over";
-let doing = ""; // what the collection is for
+let adapts = false; // whether a build is adapted to the collection
 let sensors = 0; // of the project's set, for Train
 let drawn = null; // the message on the glove's hand
 let hand = null;
 let pictured = null; // the grasp type that is drawn
 let listed = false; // whether the project has an objects.toml
-let seen = null; // the trial that is shown
-let recorded = ""; // the set of the last recording
-let edits = {}; // what its trials were made, by their number; "": left out
+let shown = { set: "", trials: [] }; // the message on the trials so far
+let seen = null; // the number of the trial that is shown
+let edits = new Map(); // what trials were made, by set and number; "": left out
 let edited = false; // whether the person's name was typed here
 
 const ask = openPage({
@@ -52,15 +52,17 @@ const ask = openPage({
     seen = trial;
     $("type").value = grasp;
     $("seen").hidden = false;
+    // Of the empty hand there is no type to correct.
+    $("relabel").hidden = grasp === "none";
     say($("seen-heading"), `Trial ${trial}: ${grasp}, ${thing}`);
     if (drawn) hand ??= drawHand($("hand"), drawn);
     hand?.setClosed(closed);
     hand?.setTaxels(pressed);
     hand?.setPose(values);
   },
-  relabelled: ({ set, trials }) => {
-    recorded = set;
-    edits = trials;
+  edits: ({ words, made }) => {
+    edits = new Map(made.map(([type, ...trial]) => [String(trial), type]));
+    showLastEdit(words);
     markTrials();
   },
   finished: ({ set, size, warnings, done, total }) => {
@@ -96,9 +98,9 @@ function show(state) {
   const before = stage;
   stage = state.stage;
   const over = stage === "over";
-  // It was begun on the page Wearer, which adapts a build to the trials.
-  if (over && doing === "wearer") location.href = "wearer.html";
-  doing = state.doing;
+  // The page Wearer shows what becomes of the build.
+  if (over && adapts) location.href = "wearer.html";
+  adapts = state.adapts;
   $("begin").hidden = !over;
   $("leading").hidden = over;
   if (over) return;
@@ -130,25 +132,27 @@ function show(state) {
 /** Show the keys that count now; the first is the one that Enter presses, and has the focus. */
 function leadBy(keys) {
   const focused = !document.activeElement || document.activeElement === document.body || $("leading").contains(document.activeElement);
-  const first = showKeys(keys, (name) => ask("key", { name }), LETTERS);
+  const first = showKeys(keys, ask, LETTERS);
   // During the countdown Enter is expected next, not now: no button takes it by accident.
   if (focused && "accept" in keys) first?.focus();
 }
 
 document.addEventListener("keydown", (event) => {
   if (stage === "over" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
-  const presses = event.target.closest?.("button, a, input, select");
+  if (event.target.closest?.("input, select")) return;
+  const presses = event.target.closest?.("button, a");
   const found = Object.entries(LETTERS).find(([, letter]) => letter === event.key || letter === event.key.toLowerCase());
   if (!found || (event.key === "Enter" && presses)) return;
   event.preventDefault();
   ask("key", { name: found[0] });
 });
 
-function showTrials({ trials, types, accuracy }) {
-  const styles = typeStyles(types);
+function showTrials(message) {
+  shown = message;
+  const { trials, types, accuracy } = shown, styles = typeStyles(types);
   fillMenu($("type"), types.filter((type) => type !== "none").map((type) => ({ id: type, name: type })));
   $("so-far").hidden = !trials.length;
-  $("seen").hidden = true;
+  if (!trials.some(([trial]) => trial === seen)) $("seen").hidden = true;
   say($("accuracy"), accuracyWords(accuracy));
   const strip = $("strip"), same = [...strip.children].findIndex((item, at) => item.dataset.trial !== String(trials[at]?.[0]));
   const keep = same < 0 ? Math.min(strip.children.length, trials.length) : same;
@@ -157,18 +161,17 @@ function showTrials({ trials, types, accuracy }) {
     const show = button(`${trial} `, () => ask("recorded", { trial }), { class: "plain", title: thing });
     show.append(tag(styles, grasp), make("span"));
     strip.append(make("li", { "data-trial": trial }, show));
+    $("strip-scroll").scrollLeft = strip.scrollWidth;
   }
   markTrials();
-  $("strip-scroll").scrollLeft = strip.scrollWidth;
 }
 
-/** Say what became of the trials of the last recording, and let it be changed. */
+/** Say what became of the trials. */
 function markTrials() {
-  $("relabel").hidden = !recorded;
-  for (const item of $("strip").children) {
-    const change = recorded ? edits[item.dataset.trial] : undefined;
-    say(item.querySelector("button").lastElementChild, change === undefined ? "" : change ? ` → ${change}` : ", left out");
-  }
+  shown.trials.forEach(([trial], at) => {
+    const change = edits.get(String([shown.set, trial]));
+    say($("strip").children[at].firstChild.lastChild, change === undefined ? "" : change ? ` → ${change}` : ", left out");
+  });
 }
 
 function accuracyWords(accuracy) {

@@ -73,7 +73,7 @@ export class Steer {
     $("steer-open").disabled = !enough;
     say($("open-command"), enough ? `thenar monitor ${recording}${builds.map((build) => ` --build ${build}`).join("")}` : "");
     if (!$("steer-run")) return;
-    const other = doing && doing !== "live" ? `The glove is in use: ${doing}. Start ends that.` : "";
+    const other = doing && doing !== "live" ? `The glove is in use: ${doing}.${doing === "recording" ? "" : " Start ends that."}` : "";
     say($("steer-run"), doing === "live" ? "Stop" : "Start");
     $("steer-run").disabled = Boolean(why);
     say($("run-command"), run ?? "");

@@ -26,7 +26,7 @@ const ask = openPage({
     list($("notes"), notes);
     say($("adapt-command"), command);
   },
-  adapted: (result) => {
+  adapt: (result) => {
     $("result").hidden = false;
     say($("result-heading"), `Adapted: ${result.folder}, from ${result.total} trials`);
     say($("before"), result.before);
@@ -40,9 +40,9 @@ const ask = openPage({
     if (awaited) $("result-heading").focus();
     awaited = false;
   },
-  collecting: ({ stage, doing }) => {
+  collecting: ({ adapts }) => {
     // The page Record leads through the trials, and comes back here.
-    if (begun && stage !== "over" && doing === "wearer") location.href = "record.html";
+    if (begun && adapts) location.href = "record.html";
   },
   station: ({ why }) => {
     if (why) say($("refused"), why);

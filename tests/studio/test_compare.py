@@ -112,9 +112,11 @@ def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
 
 def test_without_recordings_nothing_is_compared(project: Studio, folder: Path) -> None:
     (folder / "set.grasps").unlink()
-    for request in ("compare", "comparison"):
-        refused = reply(project, {"do": request, "ids": [*ids(project, "build").values()]})
-        assert "no recordings in use" in refused["why"]
+    builds = [*ids(project, "build").values()]
+    assert "recordings on which to compare" in reply(project, {"do": "compare", "ids": builds})["why"]
+    told = reply(project, {"do": "commands", "id": builds[0], "name": "generic", "ids": builds}, "commands")
+    assert told["compare"] == ""
+    assert told["firmware"]
 
 
 def test_a_single_build_is_compared_with_none(browser: Browser, project: Studio, folder: Path) -> None:
@@ -245,9 +247,9 @@ def test_axe_finds_nothing(browser: Browser, project: Studio, width: int, scheme
     [
         ({"do": "compare"}, "choose two builds"),
         ({"do": "compare", "ids": ["few", "few"]}, "choose two builds"),
-        ({"do": "compare", "ids": ["few", "set"]}, "the project has no build"),
+        ({"do": "compare", "ids": ["few", "set", "set"]}, "the project has no build"),
         ({"do": "compare", "ids": ["few", "more", "more"]}, "the project has no set"),
-        ({"do": "compare", "ids": ["../few", "../../etc"]}, "the project has no build"),
+        ({"do": "compare", "ids": ["../few", "../../etc", "set"]}, "the project has no build"),
         ({"do": "compare", "ids": "few"}, "invalid message"),
         ({"do": "report", "id": "set", "name": "generic"}, "the project has no build"),
         ({"do": "report", "id": "../few", "name": "generic"}, "the project has no build"),

@@ -16,7 +16,7 @@ from thenar.compiler.recordings.edits import TrialId, apply_edits, read_edits, t
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.drivers.errors import SettingError
 from thenar.simulator.handmaps.handmap import hand_map
-from thenar.studio.edits import change, undo
+from thenar.studio.edits import change, restore, undo
 from thenar.studio.project import Project
 
 from ..sets import grasp_set_of
@@ -117,6 +117,25 @@ def test_a_trial_that_would_become_another_gets_a_free_number(tmp_path: Path) ->
     # It frees the number that it had.
     change(log, [pen], "cup")
     assert apply_edits({"a.grasps": one}, read_edits(log)[0])[0].trials.tolist() == [2, 2, 1, 1, 1, 1]
+
+
+def test_a_trial_that_is_recorded_anew_is_as_recorded_and_its_edit_is_not_undone(tmp_path: Path) -> None:
+    log, one = tmp_path / "edits.jsonl", replace(clashing(), trials=np.repeat([1, 2, 3], 2))
+    cup, pen, _ = trials_of("a.grasps", one)
+    other = ("b.grasps", *cup[1:])
+    assert not restore(log, "a.grasps", ())
+    for trial, new in ((pen, ""), (other, "rod"), (cup, "pen"), (cup, "rod")):
+        change(log, [trial], new)
+    assert restore(log, "a.grasps", {2, 3})
+    assert not restore(log, "a.grasps", {2, 3})
+    latest = {edit.of: edit.new for edit in read_edits(log)[0]}
+    assert latest == {cup: "cup", pen: "", other: "rod"}
+    # Of the two actions on it the first is left, and takes nothing away.
+    for _ in range(3):
+        undo(log)
+    assert {edit.of: edit.new for edit in read_edits(log)[0]} == {cup: "cup", pen: "pen", other: "cup"}
+    with pytest.raises(SettingError, match="nothing to undo"):
+        undo(log)
 
 
 def test_rows_that_are_trials_are_numbered(tmp_path: Path) -> None:

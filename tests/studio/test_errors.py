@@ -1,5 +1,6 @@
 """The page *Errors*, in Chromium as a person uses it, and through its WebSocket as an attacker does."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +32,7 @@ from ..sets import grasp_set_of, single_settings
 from .test_choose import answers
 
 Start = Callable[..., Studio]
-ALL = {"do": "errors", "name": "all", "sensors": list(range(10))}
+ALL = {"do": "errors", "sensors": list(range(10))}
 MARGIN = 14  # of the map, in pixels
 
 
@@ -146,7 +147,7 @@ def test_the_name_of_a_row_selects_its_errors(browser: Browser, studio: Start) -
 def test_errors_follow_each_other_by_key_and_by_button(browser: Browser, studio: Start) -> None:
     opened = studio()
     open_errors(browser, opened)
-    wrong, trials = misread(errors_of(opened)), answers(opened)[1]["trials"]
+    wrong, trials = misread(errors_of(opened)), answers(opened)[0]["trials"]
     body = browser.driver.find_element(By.TAG_NAME, "body")
 
     def heads(trial: int) -> None:
@@ -170,7 +171,7 @@ def test_the_map_is_pointed_at_clicked_and_encircled(browser: Browser, studio: S
     """By mouse, by a finger, and by keyboard."""
     opened = studio()
     open_errors(browser, opened)
-    reply, trials = errors_of(opened), answers(opened)[1]["trials"]
+    reply, trials = errors_of(opened), answers(opened)[0]["trials"]
     canvas, places = browser.driver.find_element(By.ID, "map"), on_map(browser, reply)
     # The loneliest trial, which nobody can confuse with another.
     apart = np.hypot(*(places[:, np.newaxis] - places).transpose(2, 0, 1)) + 1e6 * np.eye(len(places))
@@ -250,7 +251,7 @@ def test_trials_are_relabelled_left_out_and_taken_back(browser: Browser, studio:
     edits = read_edits(folder / "edits.jsonl")[0]
     assert [edit.action for edit in edits] == [1] + [2] * (several - 1)
     assert (edits[0].old, edits[0].new, {edit.new for edit in edits[1:]}) == (truth, read, {""})
-    assert len(Project(folder, opened.project.hand()).grasp_set()) == 72 - several + 1
+    assert len(Project(folder, opened.project.hand()).recordings()[0]) == 72 - several + 1
     browser.click("undo")
     browser.wait(lambda: browser.text("edited").endswith(f"made {read}."))
     browser.click("undo")
@@ -280,12 +281,41 @@ def test_an_edit_waits_for_work_that_goes_on(browser: Browser, studio: Start) ->
     browser.wait(lambda: not browser.text("busy"))
 
 
+@pytest.mark.parametrize("width", [400, 1000, 1920])
+def test_a_refusal_is_seen_wherever_the_page_is_scrolled(browser: Browser, studio: Start, width: int) -> None:
+    """It is read out, and hides nothing that has the focus."""
+    open_errors(browser, studio(), width=width)
+    browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
+    cards(browser, 1)
+    truth = said(browser, "#trials article > p")[0].split(" ")[0]
+    browser.driver.find_element(By.CSS_SELECTOR, f"#type option[value={truth}]").click()
+    browser.driver.find_element(By.ID, "relabel").send_keys(Keys.ENTER)
+    browser.wait(lambda: browser.text("refused") == f"these trials are {truth} already")
+    script = """const [id, share] = arguments, element = document.getElementById(id);
+        const height = document.documentElement.scrollHeight - innerHeight;
+        scrollTo(0, share * height);
+        if (id !== "refused") element.focus();
+        const { x, y, width, height: high, bottom } = element.getBoundingClientRect();
+        const seen = document.elementFromPoint(x + width / 2, y + high / 2);
+        return height > 200 && y >= 0 && bottom <= innerHeight && element.contains(seen)"""
+    for share in (0, 0.3, 0.7, 1):
+        assert browser.script(script, "refused", share)
+        assert browser.axe() == []
+    for name in ("of", "next", "map", "relabel"):
+        assert browser.script(script, name, 1), name
+    assert browser.script("return document.getElementById('refused').role") == "alert"
+    assert browser.script("return document.documentElement.scrollWidth <= innerWidth")
+    browser.picture(f"refused-{width}")
+    browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
+    browser.wait(lambda: not browser.text("refused"))
+
+
 def test_the_next_error_follows_the_one_that_was_left_out(browser: Browser, studio: Start) -> None:
     opened = studio()
     choose_two(browser, opened)
     browser.driver.get(f"{opened.server.url}errors.html")
     browser.wait(lambda: "2 sensors" in browser.text("about"))
-    trials = answers(opened)[1]["trials"]
+    trials = answers(opened)[0]["trials"]
     wrong = misread(errors_of(opened, {"do": "errors", "sensors": [2, 8]}))
     body = browser.driver.find_element(By.TAG_NAME, "body")
     body.send_keys("nn")
@@ -359,9 +389,9 @@ def test_a_build_recognises_trials_as_it_does_frames(people: GraspSet, trained: 
     reading = BuildReading("build", build, quick)
     bits, codes = select_inputs(people, build.manifest)
     read = [build.classify(*row) for row in zip(bits, codes, strict=True)]
-    assert [reading.types[one] for one in reading.read] == read
-    assert reading.about["mean"] == np.mean(np.array(read) == people.grasps)
-    assert "54 of these 72 trials trained it" in str(reading.about["of"])
+    assert [reading.types[one] for one in reading.found.read] == read
+    assert reading.found.mean == np.mean(np.array(read) == people.grasps)
+    assert "54 of these 72 trials trained it" in reading.found.of
     wrong = [trial for trial in np.flatnonzero(np.array(read) != people.grasps).tolist() if read[trial] != "none"]
     refused = read.index("none")
     assert wrong
@@ -395,11 +425,11 @@ def test_a_build_says_what_it_was_trained_on(
     folder = tmp_path / "recorded"
     folder.mkdir()
     (folder / "build").symlink_to(trained)
-    (folder / "studio.json").write_text('{"build": "build"}')
     opened = studio()
+    (build,) = opened.project.members("build")
     open_errors(browser, opened)
-    use(browser, "build", "build build; 54 of these 72 trials trained it; 5 sensors")
-    reply = errors_of(opened, {"do": "errors", "name": "build"})
+    use(browser, f"'{build.id}'", "build build; 54 of these 72 trials trained it; 5 sensors")
+    reply = errors_of(opened, {"do": "errors", "id": build.id})
     assert browser.text("rate").startswith(f"{100 * reply['mean']:.1f} % [")
     assert "none" in said(browser, "#confusion-table th")
     browser.click("all-errors")
@@ -411,8 +441,37 @@ def test_a_build_says_what_it_was_trained_on(
     others = replace(people, switch_names=tuple(f"pad {number}" for number in range(8)))
     opened = studio(others)
     open_errors(browser, opened)
-    assert not browser.texts("#of [value=build]")
+    assert browser.texts("#of option") == ["the sensors of Choose", "all sensors"]
     assert browser.texts("#unused li")[0].startswith("build build is left out: the recordings lack")
+
+
+def test_every_build_of_the_project_can_be_looked_at(
+    browser: Browser, studio: Start, two_builds: Path, people: GraspSet, tmp_path: Path
+) -> None:
+    """Also one that is not in use; what a damaged one lacks is said, and the page goes on as it was."""
+    folder = tmp_path / "recorded"
+    shutil.copytree(two_builds, folder)
+    opened = studio()
+    ids = {one.name: one.id for one in opened.project.members("build")}
+    open_errors(browser, opened)
+    browser.wait(lambda: browser.texts("#of option")[2:] == ["build few", "build more"])
+    for name, count in (("few", 3), ("more", 4)):
+        use(browser, f"'{ids[name]}'", f"build {name}; 36 of these 72 trials trained it; {count} sensors")
+        build = Build.load(folder / name)
+        rows = zip(*select_inputs(people, build.manifest), strict=True)
+        reply = errors_of(opened, {"do": "errors", "id": ids[name]})
+        assert [reply["types"][one] for one in reply["read"]] == [build.classify(*row) for row in rows]
+    browser.click("all-errors")
+    cards(browser, min(len(misread(reply)), 24))
+    assert said(browser, "#trials article li")
+    assert browser.axe() == []
+    (folder / "few" / "tables.bin").write_bytes(b"")
+    opened.changed()
+    browser.wait(lambda: errors_of(opened, {"do": "errors", "id": ids["few"]})["topic"] == "refused")
+    browser.driver.find_element(By.CSS_SELECTOR, f"#of option[value='{ids['few']}']").click()
+    browser.wait(lambda: "tables.bin" in browser.text("refused"))
+    assert "build more" in browser.text("about")
+    browser.wait(lambda: browser.script("return document.getElementById('of').value") == ids["more"])
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (1400, "dark"), (400, "light"), (400, "dark")])
@@ -434,10 +493,10 @@ def test_nothing_keeps_people_out_of_any_state(browser: Browser, studio: Start, 
     ("asked", "why"),
     [
         ({"do": "errors", "sensors": [10]}, "there are 10 sensors"),
-        ({"do": "errors", "name": "build"}, "no build of this project recognises"),
+        ({"do": "errors", "id": "../build"}, "the project has no build '../build'"),
         ({"do": "trials", "trials": [72]}, "there are 72 trials"),
         ({"do": "trials", "trials": [-1], "sensors": [1]}, "there are 72 trials"),
-        ({"do": "trials", "trials": [0], "name": "build"}, "no build of this project recognises"),
+        ({"do": "trials", "trials": [0], "id": "0123456789ab"}, "the project has no build '0123456789ab'"),
         ({"do": "edit", "trials": [0], "name": "cup"}, "the recordings have changed"),
         ({"do": "edit", "trials": [0], "name": "spoon", "id": "it"}, "'spoon' is not a grasp type"),
         ({"do": "edit", "trials": [0], "name": "none", "id": "it"}, "'none' is not a grasp type"),
@@ -449,7 +508,7 @@ def test_nothing_keeps_people_out_of_any_state(browser: Browser, studio: Start, 
 )
 def test_what_a_page_may_not_ask_for_is_refused(studio: Start, tmp_path: Path, asked: dict[str, Any], why: str) -> None:
     opened = studio()
-    numbering = answers(opened)[1]["numbering"]
+    numbering = answers(opened)[0]["numbering"]
     *_, refused = answers(opened, {**asked, "id": numbering} if asked.get("id") == "it" else asked)
     assert refused["topic"] == "refused"
     assert why in refused["why"]

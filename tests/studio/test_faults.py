@@ -19,6 +19,7 @@ from thenar.cli import run
 from thenar.compiler import compile_build
 from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
@@ -49,14 +50,15 @@ def test_a_build_that_is_half_written_hides_nothing_else(
     Project(folder, hand).remember(build="more", wearer="A")
     (folder / "more" / "build.json").write_bytes((folder / "more" / "build.json").read_bytes()[:100])
     (folder / "half.grasps").write_bytes(b"half")
-    with page(studio().server.url, "shell,set,recordings,wearing,recogniser,work") as live:
+    with page(studio().server.url, "shell,set,recordings,wearing,recognisers,work") as live:
         shown = dict[str, Any]()
-        while not {"shell", "set", "recordings", "wearing", "recogniser"} <= {*shown} or "why" not in shown["work"]:
+        while not {"shell", "set", "recordings", "wearing", "recognisers"} <= {*shown} or "why" not in shown["work"]:
             told = json.loads(live.recv(timeout=PATIENCE_S))
             shown[told["topic"]] = told
     assert shown["shell"]["build"] == ""
     assert "build.json" in shown["wearing"]["why"]
-    assert "build.json" in shown["recogniser"]["why"]
+    assert ["build.json" in said for said in shown["recognisers"]["unused"]] == [True]
+    assert [one["name"] for one in shown["recognisers"]["builds"]] == ["few"]
     assert "build.json" in shown["work"]["why"]
     assert shown["set"]["name"] == "set.grasps"
     assert [said.partition(" is")[0] for said in shown["set"]["unused"]] == ["half.grasps"]
@@ -71,13 +73,13 @@ def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(
     people.rows(people.subjects == "C").save(folder / "C.grasps")
     (folder / "half.grasps").write_bytes(b"half")
     (folder / "few" / "build.json").write_bytes(b"{")
-    with page(studio(None).server.url, "wearing,adapted") as live:
+    with page(studio(None).server.url, "wearing,adapt") as live:
         shown = until(live, lambda told: bool(told["sets"]))
         assert [one["name"] for one in shown["sets"]] == ["C.grasps"]
         live.send(json.dumps({"do": "adapt", "ids": [one["id"] for one in shown["sets"]]}))
         # The two may come in either order.
-        told = [until(live, lambda told: told["topic"] == "adapted" or told.get("build") == "C") for _ in range(2)]
-        assert {one["topic"]: one.get("folder") or one["base"] for one in told} == {"adapted": "C", "wearing": "more"}
+        told = [until(live, lambda told: told["topic"] == "adapt" or told.get("build") == "C") for _ in range(2)]
+        assert {one["topic"]: one.get("folder") or one["base"] for one in told} == {"adapt": "C", "wearing": "more"}
 
 
 def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:
@@ -90,8 +92,12 @@ def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Pa
 
 
 def test_without_recordings_no_trial_is_edited(studio: Start, tmp_path: Path) -> None:
-    """Also if a page sends the numbering of none."""
-    assert "not read yet" in refusal(studio(None), do="edit", name="cup")
+    """Also if a page sends the numbering of none. To have none yet is no failure."""
+    opened = studio(None)
+    with page(opened.server.url, "work") as live:
+        told = until(live, lambda told: told["topic"] == "work" and (told["done"] == 1 or "why" in told))
+    assert "why" not in told
+    assert "not read yet" in refusal(opened, do="edit", name="cup")
     assert not (tmp_path / "recorded" / "edits.jsonl").exists()
 
 
@@ -138,14 +144,17 @@ def test_a_station_waits_for_no_device_and_a_recording_is_ended_by_nobody() -> N
         recorded.set()
         stop.wait()
 
-    station = Station(told.__setitem__)
+    def publish(topic: str, content: object = None, **more: object) -> None:
+        told[topic] = message(topic, content, **more)
+
+    station = Station(publish)
     station.start("watching", watch)
     station.start("recording", record)
     assert station.doing == "recording"
     assert not recorded.is_set()
     slow.set()
     assert recorded.wait(PATIENCE_S)
-    for other in ("watching", "calibrating", "live", "recording", "wearer"):
+    for other in ("watching", "calibrating", "live", "recording"):
         with pytest.raises(SettingError, match="in use: recording"):
             station.start(other, watch)
     station.close()
@@ -212,9 +221,9 @@ def glove(line: LineServer) -> str:
     return f'name = "bench"\n[[stream]]\n{stream}'
 
 
-def lead(live: ClientConnection, board: BoardSender, done: int, doing: str) -> None:
+def lead(live: ClientConnection, board: BoardSender, done: int, *, adapts: bool) -> None:
     """Accept trials of a collection that begins, until so many are done."""
-    told, step = until(live, lambda told: told["topic"] == "collecting" and told.get("doing") == doing), ""
+    told, step = until(live, lambda told: told["topic"] == "collecting" and told.get("adapts") == adapts), ""
     while told.get("done", 0) < done:
         before, step = step, str([told.get(name) for name in ("stage", "number", "done")])
         board.show(CLOSED.get(told.get("prompt", ""), {}))
@@ -250,9 +259,9 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
     (folder / "glove.toml").write_text(glove(board[0]))
     Project(folder, hand).remember(build="build")
     opened = studio(None)
-    with page(opened.server.url, "collecting,station,adapted,recordings") as live:
+    with page(opened.server.url, "collecting,station,adapt,recordings") as live:
         live.send(json.dumps({"do": "wear"}))
-        lead(live, board[1], 1, "wearer")
+        lead(live, board[1], 1, adapts=True)
         leave(live)
         assert len(read_journal(folder / "me.mcap").accepted) == 1
         assert GraspSet.load(folder / "me.grasps").joints == (coding,)
@@ -261,17 +270,17 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         assert "begun with a different value of build" in " ".join(capsys.readouterr().err.split())
         (member,) = opened.project.members("recording")
         live.send(json.dumps({"do": "continue", "id": member.id}))
-        lead(live, board[1], 4, "recording")
+        lead(live, board[1], 4, adapts=True)
         leave(live)
-        assert until(live, lambda told: told["topic"] == "adapted")["folder"] == "me"
+        assert until(live, lambda told: told["topic"] == "adapt")["folder"] == "me"
     assert GraspSet.load(folder / "me.grasps").joints == (coding,)
     assert Build.load(folder / "me").manifest.adapted is not None
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_what_was_recorded_outlives_the_studio(
-    board: tuple[LineServer, BoardSender], tmp_path: Path, number: signal.Signals
+def test_what_was_recorded_and_edited_outlives_the_studio(
+    board: tuple[LineServer, BoardSender], hand: HandShape, tmp_path: Path, number: signal.Signals
 ) -> None:
     (tmp_path / "glove.toml").write_text(glove(board[0]))
     command = [sys.executable, "-m", "thenar.cli", "studio", str(tmp_path), "--web", "127.0.0.1:0"]
@@ -280,8 +289,19 @@ def test_what_was_recorded_outlives_the_studio(
         url = process.stderr.readline().rpartition(" ")[2].strip()
         with page(url, "collecting,station") as live:
             live.send(json.dumps({"do": "record", "name": "A", "id": "own", "names": TYPES, "value": 2}))
-            lead(live, board[1], 1, "recording")
+            lead(live, board[1], 1, adapts=False)
+            with page(url, "trials,edits") as strip:
+                ((trial, grasp, _),) = until(strip, lambda told: bool(told.get("trials")))["trials"]
+                other = next(name for name in TYPES if name != grasp)
+                strip.send(json.dumps({"do": "relabel", "trial": trial, "name": other}))
+                until(strip, lambda told: bool(told.get("made")))
             process.send_signal(number)
             assert process.wait(PATIENCE_S) == (0 if number == signal.SIGINT else -signal.SIGKILL)
     assert len(read_journal(tmp_path / "A.mcap").accepted) == 1
-    assert (tmp_path / "A.grasps").exists() == (number == signal.SIGINT)
+    recorded = tmp_path / "A.grasps"
+    assert recorded.exists() == (number == signal.SIGINT)
+    if number == signal.SIGKILL:
+        import_recordings([tmp_path / "A.mcap"])[0].save(recorded)
+    assert GraspSet.load(recorded).grasps.tolist() == [grasp]
+    edited, _, unused = Project(tmp_path, hand).recordings()
+    assert (edited.grasps.tolist(), unused) == ([other], [])

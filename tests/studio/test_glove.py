@@ -235,8 +235,8 @@ def test_it_can_be_used_by_everybody(
         ({"do": "past", "trial": 10_000}, "numbered from 0"),
         ({"do": "past", "trial": -1}, "numbered from 0"),
         ({"do": "calibrate", "name": "../joints"}, "can be calibrated"),
-        ({"do": "step", "name": "explode"}, "there is no key"),
-        ({"do": "step", "name": "accept"}, "nothing is calibrated now"),
+        ({"do": "key", "name": "explode"}, "there is no key 'explode' now"),
+        ({"do": "key", "name": "accept"}, "there is no key 'accept' now"),
     ],
 )
 def test_what_no_page_sends_is_refused(studio: Start, folder: Path, asked: dict[str, object], why: str) -> None:

@@ -168,12 +168,12 @@ def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
     browser.click("drop")
     browser.wait(lambda: "left out" in browser.texts("#strip button")[0])
     project = Project(folder, page.project.hand())
-    assert len(project.grasp_set().rows(project.grasp_set().grasps == grasp)) == 1
+    assert len(project.recordings()[0].rows(project.recordings()[0].grasps == grasp)) == 1
     browser.picture("record-end")
     for _ in range(2):
         browser.click("undo")
     browser.wait(lambda: browser.texts("#strip button") == strip)
-    assert len(project.grasp_set()) == 6
+    assert len(project.recordings()[0]) == 6
     browser.wait(lambda: not browser.script("return document.getElementById('train').disabled"))
     browser.click("train")
     browser.wait(lambda: browser.text("build-heading") == "Trained: build")
@@ -223,6 +223,105 @@ def test_the_countdown_waits_while_the_glove_is_away_and_a_restart_continues(
     assert len(read_journal(folder / "Anna.mcap").accepted) == 1
 
 
+def accept(browser: Browser, board: BoardSender, number: int) -> None:
+    """Hold the grasp of this number, and accept it."""
+    browser.wait(lambda: browser.text("place").startswith(f"{number} of 6"))
+    hold(browser, board)
+    browser.driver.find_element(By.CSS_SELECTOR, "#keys [data-key=accept]").click()
+
+
+def strip(browser: Browser) -> list[str]:
+    return browser.texts("#strip button")
+
+
+def relabel(browser: Browser, new: str) -> None:
+    """Make the trial that is shown another type, and wait until the strip says so."""
+    Select(browser.driver.find_element(By.ID, "type")).select_by_value(new)
+    browser.driver.find_element(By.CSS_SELECTOR, "#relabel [type=submit]").click()
+    browser.wait(lambda: any(said.endswith(f" → {new}") for said in strip(browser)))
+
+
+def test_trials_are_edited_while_the_recording_goes_on(
+    browser: Browser, studio: Start, folder: Path, board: BoardSender
+) -> None:
+    """Their set does not exist yet. It has the edits, also if a recording is left and continued by another server."""
+    first = studio(None)
+    project = first.project
+    open_record(browser, first)
+    begin(browser)
+    browser.wait(lambda: stage(browser, "accept"))
+    browser.driver.switch_to.active_element.send_keys(Keys.ENTER)
+    accept(browser, board, 1)
+    browser.wait(lambda: len(strip(browser)) == 1)
+    plain = strip(browser)
+    browser.driver.find_element(By.CSS_SELECTOR, "#strip button").click()
+    browser.wait(lambda: browser.text("seen-heading").startswith("Trial 1: "))
+    was = browser.text("seen-heading").split(": ")[1].split(",")[0]
+    new, other = sorted({"PoS", "Tip", "Lat"} - {was})
+    # A letter chooses a type here, and skips no trial.
+    browser.driver.find_element(By.ID, "type").send_keys("s")
+    relabel(browser, new)
+    browser.click("drop")
+    browser.wait(lambda: strip(browser)[0].endswith("left out"))
+    assert browser.axe() == []
+    browser.picture("record-edit")
+    browser.click("undo")
+    browser.wait(lambda: strip(browser)[0].endswith(f" → {new}"))
+    browser.click("undo")
+    browser.wait(lambda: strip(browser) == plain)
+    assert not browser.driver.find_element(By.ID, "undo").is_enabled()
+    relabel(browser, new)
+    accept(browser, board, 2)
+    browser.wait(lambda: len(strip(browser)) == 2)
+    assert strip(browser)[0].endswith(f" → {new}")
+    browser.driver.find_elements(By.CSS_SELECTOR, "#strip button")[1].click()
+    browser.wait(lambda: browser.text("seen-heading").startswith("Trial 2: "))
+    browser.click("drop")
+    browser.wait(lambda: strip(browser)[1].endswith("left out"))
+    assert "skipped" not in browser.text("place")
+    assert not (folder / "Anna.grasps").exists()
+    for asked, why in (
+        ({"do": "recorded", "trial": 99}, "trial 99 was not recorded"),
+        ({"do": "relabel", "trial": 3, "name": "Tip"}, "trial 3 is not among those that were accepted"),
+        ({"do": "relabel", "trial": 1, "name": "spoon"}, "spoon"),
+        ({"do": "relabel", "trial": 1, "name": "none"}, "none"),
+        ({"do": "relabel", "trial": 1, "name": new}, f"are {new} already"),
+    ):
+        assert why in reply(first, asked)["why"]
+    browser.driver.find_element(By.TAG_NAME, "body").send_keys("q")
+    browser.wait(lambda: browser.text("end-heading") == "Recorded: Anna.grasps")
+    assert len(GraspSet.load(folder / "Anna.grasps")) == 2
+    edited, trials, unused = project.recordings()
+    assert (edited.grasps.tolist(), [trial[3] for trial in trials], unused) == ([new], [was], [])
+    first.close()
+    open_record(browser, studio(None))
+    browser.wait(lambda: browser.texts("#recordings button"))
+    browser.driver.find_element(By.CSS_SELECTOR, "#recordings button").click()
+    browser.wait(lambda: stage(browser, "accept"))
+    browser.wait(lambda: len(strip(browser)) == 2)
+    assert (strip(browser)[0].endswith(f" → {new}"), strip(browser)[1].endswith("left out")) == (True, True)
+    browser.driver.switch_to.active_element.send_keys(Keys.ENTER)
+    accept(browser, board, 3)
+    browser.wait(lambda: len(strip(browser)) == 3)
+    browser.driver.find_elements(By.CSS_SELECTOR, "#strip button")[2].click()
+    browser.wait(lambda: browser.text("seen-heading").startswith("Trial 3: "))
+    relabel(browser, other if browser.text("seen-heading").split(": ")[1].split(",")[0] != other else new)
+    # The set of the first sitting lacks the trial, whose edit waits.
+    assert project.recordings()[2] == []
+    # What was undone is recorded anew, and has its own type again; nothing is left to undo but what was before.
+    browser.driver.find_element(By.TAG_NAME, "body").send_keys("u")
+    browser.wait(lambda: len(strip(browser)) == 2)
+    accept(browser, board, 3)
+    browser.wait(lambda: len(strip(browser)) == 3)
+    assert " → " not in strip(browser)[2]
+    assert "trial 2 of Anna" in browser.text("edited")
+    browser.driver.find_element(By.TAG_NAME, "body").send_keys("q")
+    browser.wait(lambda: "3 of 6 trials are done" in browser.text("size"))
+    edited, trials, unused = project.recordings()
+    assert ([trial[5] for trial in trials], unused) == ([1, 3], [])
+    assert edited.grasps.tolist() == [new, trials[1][3]]
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(400, "light"), (1400, "dark")])
 def test_it_can_be_used_by_everybody(
     browser: Browser, studio: Start, folder: Path, board: BoardSender, width: int, scheme: str
@@ -250,9 +349,9 @@ def test_it_can_be_used_by_everybody(
         ({"do": "record", "name": "Anna", "id": "kamakura14"}, "whole number from 1"),
         ({"do": "record", "name": "Anna", "id": "kamakura14", "value": 2, "ids": ["spoon"]}, "is not a grasp type of"),
         ({"do": "continue", "id": "../glove.toml"}, "the project has no recording"),
-        ({"do": "key", "name": "explode"}, "there is no key"),
-        ({"do": "key", "name": "accept"}, "nothing is recorded now"),
-        ({"do": "recorded", "trial": 99}, "was not recorded"),
+        ({"do": "key", "name": "explode"}, "there is no key 'explode' now"),
+        ({"do": "key", "name": "accept"}, "there is no key 'accept' now"),
+        ({"do": "recorded", "trial": 99}, "nothing was recorded here yet"),
         ({"do": "relabel", "trial": 1, "name": "Tip"}, "nothing was recorded here yet"),
     ],
 )

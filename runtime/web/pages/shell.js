@@ -22,7 +22,7 @@ export function openPage(handlers) {
   const cancel = button("Cancel", () => send({ do: "cancel" }), { id: "cancel", class: "plain", hidden: true });
   const busy = make("p", { class: "row" }, make("span", { id: "work" }), cancel);
   const refused = make("p", { id: "refused", role: "alert" });
-  document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages, busy, refused));
+  document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages, busy), refused);
   badge("link", "bad", "page: connecting");
   const send = connect({
     work,
