@@ -41,7 +41,8 @@ def command(
 
     With --line, listen to a board or program that sends numbers, in lines or binary frames, and show each column:
     meanwhile press every switch and pad, and bend every finger. PORT is a serial port, tcp://HOST:PORT,
-    udp://HOST:PORT, ble://NAME, - (stdin), lsl:NAME, ros:/TOPIC, mqtt:HOST/TOPIC or osc:HOST:PORT/ADDRESS.
+    udp://HOST:PORT, ble://NAME, - (stdin), lsl:NAME, ros:/TOPIC, mqtt:HOST/TOPIC, osc:HOST:PORT/ADDRESS, or cyberglove:
+    and the serial port of a CyberGlove.
 
     Exit code 1 if something is missing; with --build, also if the glove's calibration does not fit the build.
 
@@ -90,14 +91,12 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
     """Show what a port sends, and print the glove.toml that reads it, or write it to a file."""
     from thenar.runtime.files import write_atomically
     from thenar.runtime.harness.checks import faults
-    from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.harness.writing import harness_to_toml
-    from thenar.runtime.live.stream_probe import propose_stream
+    from thenar.runtime.live.stream_probe import propose_glove
 
     echo(f"listening to {port} for {seconds:g} s: press every switch and pad, bend every finger", err=True)
-    found = propose_stream(port, baud, seconds, columns)
-    harness = Harness(name="glove", streams=(found.stream,))
-    text = harness_to_toml(harness)
+    found = propose_glove(port, baud, seconds, columns)
+    text = harness_to_toml(found.harness)
 
     def show_heard(_: object) -> None:
         ends = (["" if end is None else f"{end:g}" for end in (one.least, one.greatest)] for one in found.columns)
@@ -106,13 +105,13 @@ def _listen(port: str, baud: int, seconds: float, columns: "Sequence[str]", prop
         err().print(table(columns, columns[1:3], f"{found.rows} rows", rows))
         for remark in found.remarks:
             err().print(of_device(port, remark))
-        if propose is None and found.stream.used:
+        if propose is None and found.sensors:
             echo(text.rstrip("\n"))
 
     show(found, show_heard)
-    if not found.stream.used:
+    if not found.sensors:
         raise click.ClickException(f"{port}: no column is a switch, a joint or a taxel, so no glove.toml is proposed")
-    for _, reason in faults(harness):
+    for _, reason in faults(found.harness):
         err().print(f"fix this before using it: {reason}")
     if propose is not None:
         write_atomically(propose, text.encode())

@@ -17,10 +17,10 @@ from thenar.runtime.files import write_atomically
 from thenar.runtime.frames import GloveFrame, now_us
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.sources import Sources
-from thenar.runtime.live.stream_probe import propose_stream
+from thenar.runtime.live.stream_probe import CYBERGLOVE, propose_glove
 from thenar.runtime.names import list_names, of_device, shortened
 from thenar.runtime.posing import PoseGuide, PoseKey
 from thenar.runtime.published import DeviceHealth
@@ -83,7 +83,8 @@ class GlovePage:
 
     def _on_find(self, asked: Asked) -> None:
         """Listen at an address, and propose a glove.toml."""
-        if fault := "is not an address of rows" if asked.name == "-" else line_port_fault(asked.name):
+        port = asked.name.removeprefix(CYBERGLOVE)
+        if fault := "is not an address of a glove" if port == "-" else line_port_fault(port):
             raise SettingError(f"{shortened(repr(asked.name))} {fault}")
         self._proposal = ""
         self._studio.station.start("looking", partial(self._find, asked.name))
@@ -92,10 +93,9 @@ class GlovePage:
         self._studio.publish("found", port=port, busy=True)
         text, wrong = "", list[str]()
         try:
-            found = propose_stream(port, _BAUD, _LISTEN_S)
-            harness = Harness(name="glove", streams=(found.stream,))
-            wrong = [reason for _, reason in faults(harness)] if found.stream.used else ["no column is a sensor"]
-            text = harness_to_toml(harness)
+            found = propose_glove(port, _BAUD, _LISTEN_S)
+            wrong = [reason for _, reason in faults(found.harness)] if found.sensors else ["no column is a sensor"]
+            text = harness_to_toml(found.harness)
             content: dict[str, object] = {"columns": found.columns, "rows": found.rows, "remarks": found.remarks}
         except (ThenarError, OSError) as reason:
             content, wrong = {"columns": (), "rows": 0, "remarks": ()}, [of_device(port, str(reason))]

@@ -15,7 +15,7 @@ from time import monotonic
 import pytest
 
 from thenar.drivers.lines import LineParser, Row
-from thenar.runtime.live.stream_probe import propose_stream
+from thenar.runtime.live.stream_probe import propose_glove
 
 from .conftest import tool
 
@@ -88,7 +88,7 @@ def test_the_python_sender_over_a_pty_is_proposed_as_what_it_is(started: Callabl
         [sys.executable, "-c", f"import os\nwhile True: os.write({heard}, os.read({near}, 999))"],
         pass_fds=(near, heard),
     )
-    found = propose_stream(os.ttyname(port), 115_200, 3.5).stream
+    found = propose_glove(os.ttyname(port), 115_200, 3.5).harness.streams[0]
     assert cable is not None
     assert (found.time, found.time_unit) == ("c1", "ms")
     assert found.switches == ("c2", "c3")

@@ -1,8 +1,9 @@
-"""The rows of an unknown sender, and a proposal of the `[[stream]]` that reads them."""
+"""What an unknown sender sends, and a proposal of the glove.toml that reads it."""
 
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import astuple
 from itertools import pairwise
 from math import ceil, floor, log10, pi
@@ -10,6 +11,7 @@ from statistics import median
 
 import msgspec
 
+from thenar.drivers.cyberglove import CyberGlove
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.frames import FrameParser, guess_frame
 from thenar.drivers.lines import UNITS_US, Row, RowReader
@@ -17,11 +19,13 @@ from thenar.drivers.readers import LineReader
 from thenar.drivers.transports import OTHER_PORTS, is_serial
 
 from ..frames import now_us
-from ..harness.wiring import Range, StreamWiring
+from ..harness.wiring import GloveWiring, Harness, Range, StreamWiring
 from ..names import fault, list_names, nearest, shortened
 from ..sources.base import SOURCES
 from ..sources.rows import RowKind
 
+# What stands before the port of a CyberGlove, which sends nothing unless it is asked.
+CYBERGLOVE = "cyberglove:"
 # Boards that are reset when their port opens start their program within this time.
 _PATIENCE_US = 6_000_000
 _MOST_ROWS = 100_000
@@ -57,12 +61,17 @@ class ColumnGuess(msgspec.Struct, frozen=True):
 
 
 class Proposal(msgspec.Struct, frozen=True):
-    """The stream that fits a sender, its columns, and remarks on oddities, in sentences."""
+    """The glove.toml that fits a sender, its columns, and remarks on oddities, in sentences."""
 
-    stream: StreamWiring
+    harness: Harness
     columns: tuple[ColumnGuess, ...]
     rows: int
     remarks: tuple[str, ...]
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """The names of all its switches, taxels and joints."""
+        return (*self.harness.switches, *self.harness.taxel_names, *self.harness.sensor_names)
 
 
 def reader_of(wiring: StreamWiring) -> RowReader:
@@ -74,12 +83,16 @@ def reader_of(wiring: StreamWiring) -> RowReader:
     raise SettingError(f"{shortened(repr(port))} is not a port for rows{nearest(port, OTHER_PORTS)}")
 
 
-def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str] = ()) -> Proposal:
-    """Return the stream that fits the rows from `port` within `listen_s` seconds after the first; `columns` name those
-    that the sender does not.
+def propose_glove(port: str, baud: int, listen_s: float, columns: Sequence[str] = ()) -> Proposal:
+    """Return the glove.toml that fits what `port` sends within `listen_s` seconds after the first row.
 
-    Raises SettingError for an invalid port, DeviceError if no rows come.
+    `port` is that of a stream of rows, whose columns `columns` name if the sender does not; or "cyberglove:" and the
+    port of a CyberGlove.
+
+    Raises SettingError for an invalid port, DeviceError if no rows come, or no CyberGlove replies.
     """
+    if port.startswith(CYBERGLOVE):
+        return _proposed_cyberglove(port.removeprefix(CYBERGLOVE), baud, listen_s, tuple(columns))
     bare = StreamWiring(port=port, columns=tuple(columns))
     if is_serial(port):
         bare = msgspec.structs.replace(bare, baud=baud)
@@ -97,13 +110,33 @@ def propose_stream(port: str, baud: int, listen_s: float, columns: Sequence[str]
         counts, odd = parser.counts, parser.odd
         other = other or f"frames of {frame}: bytes that never changed are taken as fixed, so move every sensor"
     if not came:
-        raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or 'no data received'}")
+        silent = "no data received" + (f"; of a CyberGlove, the port is {CYBERGLOVE}{port}" if is_serial(port) else "")
+        raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or silent}")
     wrong, such = counts.misfits + counts.overlong, f", such as {odd}" if odd else ""
     remarks = [f"{wrong} lines were not rows{such}" if wrong > 1 else f"1 line was not a row: {odd}"] if wrong else []
     remarks += [f"{counts.damaged} lines were damaged: check the cable and the baud rate"] if counts.damaged else []
     remarks += [other] if other else []
     remarks += [f"{counts.foreign} rows of another sender were left out"] if counts.foreign else []
     return _proposed(bare, came, reader.kind, remarks)
+
+
+def _proposed_cyberglove(port: str, baud: int, listen_s: float, joints: tuple[str, ...]) -> Proposal:
+    """Return the proposal for the CyberGlove at a port; `joints` name its sensors otherwise than the driver does."""
+    records = list[bytes]()
+    with closing(CyberGlove(port, baud=baud)) as glove:
+        info, end_us = glove.open(), now_us() + round(listen_s * 1e6)
+        while now_us() < end_us:
+            timed = glove.read(_WAIT_S)
+            records += [timed[1].sensors] if timed is not None and timed[1].fault is None else []
+    if not records:
+        raise DeviceError(f"{port}: the CyberGlove measures nothing: plug it into its box")
+    names = _columns(joints, None, info.total, []) if joints else info.names
+    values = {name: list(map(float, found)) for name, found in zip(names, zip(*records, strict=True), strict=True)}
+    still = [name for name, found in values.items() if _is_still("joint", found)]
+    heard = tuple(ColumnGuess(name, min(found), max(found), "joint") for name, found in values.items())
+    wiring = GloveWiring(port=port, baud=baud, sensors=info.total, joints=joints)
+    harness = Harness(name="glove", cyberglove=wiring)
+    return Proposal(harness, heard, len(records), (*info.notes, *_unmoved(still)))
 
 
 def _is_binary(chunks: Sequence[bytes]) -> bool:
@@ -168,8 +201,8 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
     numbers = {name: [value for value in found if value is not None] for name, found in values.items()}
     kinds = {name: _kind(name, found, every) for name, found in numbers.items()}
     kinds |= {name: "nothing: its name is not valid" for name in columns if names and name not in names}
-    if still := [name for name, found in numbers.items() if kinds[name] == _STILL or _is_still(kinds[name], found)]:
-        remarks.append(f"{list_names(still)} did not move: press every pad and bend every finger while doctor listens")
+    still = [name for name, found in numbers.items() if kinds[name] == _STILL or _is_still(kinds[name], found)]
+    remarks += _unmoved(still)
     kinds |= {} if time is None else {time: f"the sender's clock, in {unit}"}
     for name, found in values.items():
         if missing := found.count(None):
@@ -190,7 +223,12 @@ def _proposed(bare: StreamWiring, came: Sequence[tuple[int, Row]], every: str, r
         ColumnGuess(name, min(found, default=None), max(found, default=None), kinds[name])
         for name, found in numbers.items()
     )
-    return Proposal(stream, tuple(heard), len(came), tuple(remarks))
+    return Proposal(Harness(name="glove", streams=(stream,)), tuple(heard), len(came), tuple(remarks))
+
+
+def _unmoved(names: Sequence[str]) -> list[str]:
+    """Return a remark on sensors that did not move."""
+    return [f"{list_names(names)} did not move: press every pad and bend every finger meanwhile"] if names else []
 
 
 def _columns(given: tuple[str, ...], names: tuple[str, ...] | None, width: int, remarks: list[str]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.live import checkup
+from thenar.runtime.live import checkup, stream_probe
 
 from .conftest import thenar
 
@@ -103,3 +103,30 @@ def test_a_harness_without_devices_is_refused(tmp_path: Path) -> None:
     done = thenar("doctor", tmp_path / "glove.toml")
     assert done.returncode == 2
     assert "glove.toml names no device" in done.stderr
+
+
+@pytest.mark.usefixtures("glove")
+def test_the_proposal_for_a_cyberglove_is_one_that_doctor_accepts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checkup, "_LISTEN_S", 0.3)
+    line, proposal = f"cyberglove:{tmp_path}/port", tmp_path / "found.toml"
+    few = thenar("doctor", "--line", line, "--seconds", "0.5", "--names", "a,b")
+    assert few.returncode == 2
+    assert "2 columns are named, but rows have 18" in " ".join(few.stderr.split())
+    done = thenar(
+        "doctor", "--line", line, "--seconds", "0.5", "--names", ",".join(NAMES), "--json", "--propose", proposal
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [one["column"] for one in found["columns"]] == NAMES
+    assert "did not move: press every pad and bend every finger" in " ".join(found["remarks"])
+    assert thenar("doctor", proposal).returncode == 0
+
+
+@pytest.mark.usefixtures("glove")
+def test_silence_on_a_serial_port_hints_at_a_cyberglove(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream_probe, "_PATIENCE_US", 500_000)
+    done = thenar("doctor", "--line", f"{tmp_path}/port", "--seconds", "0.5")
+    assert done.returncode == 2
+    assert f"of a CyberGlove, the port is cyberglove:{tmp_path}/port" in "".join(done.stderr.split("\n"))

@@ -84,7 +84,7 @@ def test_names_that_the_sender_gives_say_what_columns_are(tmp_path: Path) -> Non
         "thumb": "switch",
         "off": "nothing: no number came",
     }
-    assert found["stream"]["rate_hz"] == 50
+    assert found["harness"]["stream"][0]["rate_hz"] == 50
     assert [text.split(", ")[0] for text in found["remarks"]] == [
         "30 lines were not rows",
         "the rows came all at once: rate_hz is by their clock",
@@ -104,13 +104,13 @@ def test_columns_that_did_not_move_are_said_and_get_no_range() -> None:
     found = json.loads(listened(header + "".join(rows), "--json").stdout)
     still = ["index", "fsr_palm", "flex_mcp"]
     assert [one["column"] for one in found["columns"] if one["taken_for"] == "nothing: it did not move"] == still
-    stream = found["stream"]
+    stream = found["harness"]["stream"][0]
     assert (stream["switches"], list(stream["taxels"]), list(stream["joints"])) == (
         ["thumb"],
         ["fsr_tip"],
         ["flex_pip"],
     )
-    said = "index, fsr_palm, flex_mcp did not move: press every pad and bend every finger while doctor listens"
+    said = "index, fsr_palm, flex_mcp did not move: press every pad and bend every finger meanwhile"
     assert said in found["remarks"]
 
 
@@ -153,13 +153,13 @@ def test_unusable_lines_are_shown_and_no_file_is_written(line: str, said: str, t
 def test_column_names_are_stripped_and_checked_unless_the_sender_names_them() -> None:
     rows = "".join(f"{20 * n},{n % 2}\n" for n in range(30))
     found = json.loads(listened(rows, "--names", "ms, thumb", "--json").stdout)
-    assert found["stream"]["columns"] == ["ms", "thumb"]
+    assert found["harness"]["stream"][0]["columns"] == ["ms", "thumb"]
     done = listened(rows, "--names", "thumb,thumb")
     assert (done.returncode, "--names names a column twice: thumb, thumb" in done.stderr) == (2, True)
     done = listened(rows, "--names", "ms,thumb,index")
     assert (done.returncode, "3 columns are named, but rows have 2" in done.stderr) == (2, True)
     found = json.loads(listened(f"t_ms,index\n{rows}", "--names", "ms,thumb", "--json").stdout)
-    assert found["stream"]["columns"] == ["t_ms", "index"]
+    assert found["harness"]["stream"][0]["columns"] == ["t_ms", "index"]
     assert "the sender names its columns itself, so --names is not used" in found["remarks"]
 
 
@@ -234,7 +234,7 @@ def test_rows_that_had_been_waiting_do_not_count_for_the_rate(tmp_path: Path) ->
             assert process.wait(60) == 0
         assert process.stdout is not None
         found = json.loads(process.stdout.read())
-    assert 0 < found["stream"]["rate_hz"] <= 110
+    assert 0 < found["harness"]["stream"][0]["rate_hz"] <= 110
 
 
 def test_a_line_where_nothing_comes_or_nothing_can_is_said(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.stream_probe import propose_stream
+from thenar.runtime.live.stream_probe import propose_glove
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sinks import open_sink
@@ -180,7 +180,7 @@ def test_no_frame_is_proposed_for_messages_at_another_address() -> None:
     sending.start()
     try:
         with pytest.raises(DeviceError, match="the data holds no rows: a message at /glove"):
-            propose_stream(f"osc:127.0.0.1:{address[1]}/glow", 115_200, 0.5)
+            propose_glove(f"osc:127.0.0.1:{address[1]}/glow", 115_200, 0.5)
     finally:
         done.set()
         sending.join()

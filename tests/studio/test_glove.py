@@ -145,6 +145,20 @@ def test_a_glove_is_connected_from_an_empty_folder(
     assert browser.text("problem") == "The taxels are not calibrated. Calibrate them now."
 
 
+def test_a_cyberglove_is_found_when_its_port_is_named_so(browser: Browser, studio: Start, folder: Path) -> None:
+    open_glove(browser, studio(None))
+    browser.wait(lambda: browser.text("addresses"))
+    with PtyLine(folder / "port") as port, EmulatedCyberGlove(port, sensors=22):
+        browser.driver.find_element(By.ID, "address").send_keys(f"cyberglove:{folder}/port", Keys.ENTER)
+        browser.wait(lambda: browser.text("proposal"))
+        assert len(browser.texts("#columns tr")) == 23
+        browser.click("connect")
+        browser.wait(lambda: len(states(browser)) == 22)
+    harness = load_harness(folder / "glove.toml")
+    assert harness.cyberglove is not None
+    assert (harness.cyberglove.port, len(harness.sensor_names)) == (f"{folder}/port", 22)
+
+
 def test_an_address_without_a_glove_is_said(browser: Browser, studio: Start, folder: Path) -> None:
     open_glove(browser, studio(None))
     browser.wait(lambda: browser.text("addresses"))
@@ -230,6 +244,7 @@ def test_it_can_be_used_by_everybody(
         ({"do": "find", "name": "-"}, "is not an address"),
         ({"do": "find", "name": "spy:///etc/passwd"}, "is not a"),
         ({"do": "find", "name": "tcp://host:99999"}, "is not an address"),
+        ({"do": "find", "name": "cyberglove:-"}, "is not an address"),
         ({"do": "find", "name": ""}, "is empty"),
         ({"do": "connect"}, "a glove.toml already"),
         ({"do": "past", "trial": 10_000}, "numbered from 0"),

@@ -17,7 +17,7 @@ import pytest
 from thenar.drivers.errors import SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.stream_probe import propose_stream
+from thenar.runtime.live.stream_probe import propose_glove
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.ros import RosReader
@@ -144,7 +144,7 @@ def test_doctor_proposes_joints_for_a_joint_state_whatever_their_names_and_value
     sender = Thread(target=send)
     sender.start()
     try:
-        found = propose_stream(f"ros:{topic}?type={kind}", 115_200, 0.5).stream
+        found = propose_glove(f"ros:{topic}?type={kind}", 115_200, 0.5).harness.streams[0]
     finally:
         done.set()
         sender.join()
