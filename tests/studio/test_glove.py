@@ -151,7 +151,7 @@ def test_a_cyberglove_is_found_when_its_port_is_named_so(browser: Browser, studi
     with PtyLine(folder / "port") as port, EmulatedCyberGlove(port, sensors=22):
         browser.driver.find_element(By.ID, "address").send_keys(f"cyberglove:{folder}/port", Keys.ENTER)
         browser.wait(lambda: browser.text("proposal"))
-        assert len(browser.texts("#columns tr")) == 23
+        assert len(browser.texts("#columns tr")) == 22
         browser.click("connect")
         browser.wait(lambda: len(states(browser)) == 22)
     harness = load_harness(folder / "glove.toml")
