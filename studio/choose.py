@@ -157,16 +157,18 @@ class ChoosePage:
             weakest=_weakest(now.quick, found),
             scan_us=scan_time_us([now.levels[name] for name in names if name in now.levels]),
             price=sum(now.prices[name] for name in names) if now.parts else None,
-            command=self._command(now.files, names),
+            commands=self._commands(now.files, names),
         )
 
-    def _command(self, files: Sequence[str], names: Sequence[str]) -> str:
-        """Return the commands that compile a build of these sensors from these sets."""
-        if not names:
-            return ""
-        more: list[object] = ["-o", self._project.new_path(_BUILD), *self._project.options()]
-        more += ["--sensors", len(names), "--have", ",".join(names)]
-        return self._project.command(["compile"], [self._project.folder / name for name in files], more)
+    def _commands(self, files: Sequence[str], names: Sequence[str]) -> dict[str, str]:
+        """Return the commands that do what the buttons do, by their requests, from these sets."""
+        command, sets = self._project.command, [self._project.folder / name for name in files]
+        commands = {"curve": command(["place"], sets)}
+        if names:
+            these = ["--sensors", len(names), "--have", ",".join(names)]
+            more = ["-o", self._project.new_path(_BUILD), *self._project.options(), *these]
+            commands |= {"measure": command(["place"], sets, these), "train": command(["compile"], sets, more)}
+        return commands
 
     def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> dict[str, object]:
         """Measure the curve, or the accuracy of chosen sensors, or train a build of these.

@@ -45,6 +45,7 @@ _ADVICE = {
     "stuck": "stays the same while others change: look whether it sticks, or its wires touch",
     "never seen": "has not changed yet: press it, or bend the finger",
 }
+_JOINTS_FILE, _PADS_FILE = "joints.toml", "taxels.toml"
 _UNCALIBRATED = {"joint": "The joints are not calibrated.", "pad": "The taxels are not calibrated."}
 
 
@@ -76,7 +77,12 @@ class GlovePage:
             except (ThenarError, OSError) as reason:
                 why = str(reason)
         ports = sorted(str(port) for pattern in _PORTS for port in Path("/dev").glob(pattern))
-        self._studio.publish("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports)
+        words = ["calibrate", self._project.harness, "--overwrite", "--subject", self._project.state.wearer]
+        commands = {
+            "joint": self._project.command([*words, "-o", self._project.folder / _JOINTS_FILE]),
+            "pad": self._project.command([*words, "--taxels", "-o", self._project.folder / _PADS_FILE]),
+        }
+        self._studio.publish("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports, commands=commands)
 
     def _sensors(self) -> GloveSensors:
         return GloveSensors(self._project.wiring(), self._project.hand())
@@ -100,7 +106,8 @@ class GlovePage:
         except (ThenarError, OSError) as reason:
             content, wrong = {"columns": (), "rows": 0, "remarks": ()}, [of_device(port, str(reason))]
         self._proposal = "" if wrong else text
-        self._studio.publish("found", content, port=port, busy=False, text=text, wrong=wrong)
+        command = self._project.command(["doctor", "--line", port, "--propose", self._project.harness])
+        self._studio.publish("found", content, port=port, busy=False, text=text, wrong=wrong, command=command)
 
     def _on_connect(self, _asked: Asked) -> None:
         """Write the proposed glove.toml."""
@@ -215,7 +222,7 @@ class GlovePage:
             return
         lines = guide.calibration(self._project.state.wearer)
         device = "cyberglove" if self._project.wiring().cyberglove is not None else "stream"
-        self._written(device, "joints.toml", [line.name for line in lines.sensors], guide.names, lines.to_toml())
+        self._written(device, _JOINTS_FILE, [line.name for line in lines.sensors], guide.names, lines.to_toml())
 
     def _calibrate_pads(self, stop: Event) -> None:
         words = {"untouched": "Nothing is pressed", "pressing": "All were pressed"}
@@ -234,7 +241,7 @@ class GlovePage:
         found = lead_presses(self._project.harness, _HOLD_S, view, stop, self._project.state.wearer)
         if found is not None:
             names, pads = found
-            self._written("taxels", "taxels.toml", [line.name for line in pads.taxels], names, pads.to_toml())
+            self._written("taxels", _PADS_FILE, [line.name for line in pads.taxels], names, pads.to_toml())
 
     def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> None:
         """Write a calibration of sensors, and name it in glove.toml."""

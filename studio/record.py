@@ -127,7 +127,13 @@ class RecordPage:
             raise SettingError(types.unknown(unknown[0]))
         tasks = tuple(task for task in tasks if not asked.ids or task.grasp in (*asked.ids, NONE))
         collection = Collection(asked.name, types.name, types.types, tasks, int(repetitions), secrets.randbits(32))
-        self._start(self._project.new_path(asked.name, ".mcap", ".grasps"), collection)
+        recording = self._project.new_path(asked.name, ".mcap", ".grasps")
+        words: list[object] = ["record", "--glove", self._project.harness, "--subject", asked.name]
+        words += ["--taxonomy", asked.id, *([] if self._objects is None else ["--objects", self._objects])]
+        words += ["--repetitions", int(repetitions), "--none" if asked.trial else "--no-none"]
+        words += ["-o", recording.with_suffix(".grasps")]
+        # A command records all types.
+        self._start(recording, collection, command="" if asked.ids else self._project.command(words))
         if asked.name != self._project.state.wearer:
             self._project.remember(wearer=asked.name)
             self._studio.changed()
@@ -162,8 +168,11 @@ class RecordPage:
 
     # A collection, on the thread of the station.
 
-    def _start(self, recording: Path, collection: Collection, journal: Journal | None = None) -> None:
+    def _start(
+        self, recording: Path, collection: Collection, journal: Journal | None = None, *, command: str = ""
+    ) -> None:
         sitting = Sitting(self._studio, recording, collection, journal)
+        self._studio.publish("record-command", command=command)
         self._studio.station.start("recording", partial(self._lead, sitting), KEYS)
 
     def _lead(self, sitting: "Sitting", stop: Event) -> None:

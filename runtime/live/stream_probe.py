@@ -12,6 +12,7 @@ from statistics import median
 import msgspec
 
 from thenar.drivers.cyberglove import CyberGlove
+from thenar.drivers.cyberglove_protocol import SENSORS_22
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.frames import FrameParser, guess_frame
 from thenar.drivers.lines import UNITS_US, Row, RowReader
@@ -134,7 +135,7 @@ def _proposed_cyberglove(port: str, baud: int, listen_s: float, joints: tuple[st
     values = {name: list(map(float, found)) for name, found in zip(names, zip(*records, strict=True), strict=True)}
     still = [name for name, found in values.items() if _is_still("joint", found)]
     heard = tuple(ColumnGuess(name, min(found), max(found), "joint") for name, found in values.items())
-    wiring = GloveWiring(port=port, baud=baud, sensors=info.total, joints=joints)
+    wiring = GloveWiring(port=port, baud=baud, sensors=22 if info.total == len(SENSORS_22) else None, joints=joints)
     harness = Harness(name="glove", cyberglove=wiring)
     return Proposal(harness, heard, len(records), (*info.notes, *_unmoved(still)))
 

@@ -106,7 +106,7 @@ function show(reply) {
   const moved = change === null ? "" : `; ${change >= 0 ? "+" : ""}${change.toFixed(1)} points by the last click`;
   say($("change"), `trials, ${reply.of}; quick: not nested, and chosen while looking at it${moved}`);
   say($("weakest"), reply.weakest);
-  say($("command"), reply.command || "choose a sensor");
+  for (const what of ["measure", "curve", "train"]) say($(`${what}-command`), reply.commands[what] ?? "choose a sensor");
   say($("spoken"), `${chosen.length} sensors, ${percent(reply.mean)} percent`);
   $("measure").disabled = $("train").disabled = !chosen.length;
   certify();

@@ -61,14 +61,15 @@ function showGlove(message) {
   const kinds = Object.keys(KINDS).filter((kind) => about.kinds.includes(kind));
   $("calibrate").replaceChildren(...kinds.map((kind) => {
     const words = `Calibrate the ${KINDS[kind]}${about.lacks.includes(kind) ? "" : " anew"}`;
-    return button(words, () => ask("calibrate", { name: kind }), { class: "plain" });
+    const start = button(words, () => ask("calibrate", { name: kind }), { class: "plain" });
+    return make("p", { class: "row" }, start, make("code", {}, about.commands[kind]));
   }));
   states = [];
   choose(null);
   watchOnce();
 }
 
-function showFound({ port, busy, columns, rows, remarks, text, wrong }) {
+function showFound({ port, busy, columns, rows, remarks, text, wrong, command }) {
   $("found").hidden = false;
   say($("found-heading"), busy ? `Listening to ${port}: press every switch and pad, bend every finger` : `${rows} rows came from ${port}`);
   $("connect").hidden = $("proposal").hidden = busy || wrong.length > 0;
@@ -76,6 +77,7 @@ function showFound({ port, busy, columns, rows, remarks, text, wrong }) {
   list($("remarks"), busy ? [] : [...wrong, ...remarks]);
   if (busy) return;
   say($("proposal"), text);
+  say($("find-command"), command);
   const sent = columns.map(({ column, least, greatest, taken_for }) => [column, least ?? "", greatest ?? "", taken_for ?? ""]);
   fillTable("columns", ["Column", "Least", "Greatest", "Taken for"], sent);
 }

@@ -43,6 +43,7 @@ const ask = openPage({
   },
   closed: () => say($("standing"), "this page is not connected"),
   collecting: (state) => show(state),
+  "record-command": ({ command }) => say($("record-command"), command),
   trials: (message) => showTrials(message),
   "glove-hand": (message) => {
     drawn = message.hand;

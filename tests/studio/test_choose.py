@@ -63,7 +63,7 @@ def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio
     assert first.get_attribute("aria-pressed") == "true"
     boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#list input")
     assert [box.is_selected() for box in boxes].count(True) == 1
-    assert browser.text("command") == (
+    assert browser.text("train-command") == (
         f"thenar compile {folder}/set.grasps -o {folder}/build --prices {folder}/prices.toml --sensors 1 --have {name}"
     )
     assert browser.text("price") == "2.50"
@@ -89,7 +89,7 @@ def test_the_best_is_added_measured_and_compared_with_the_curve(
         counts(browser, number)
     browser.click("drop")
     counts(browser, 2)
-    have = tuple(browser.text("command").rpartition(" ")[2].split(","))
+    have = tuple(browser.text("train-command").rpartition(" ")[2].split(","))
     browser.click("measure")
     browser.wait(lambda: browser.text("measured"))
     recipe = Recipe(sensors=2, have=have)
@@ -105,7 +105,7 @@ def test_the_best_is_added_measured_and_compared_with_the_curve(
     assert browser.texts("#points [aria-current] th") == [f"{curve.enough}: more matter little"]
     browser.driver.find_elements(By.CSS_SELECTOR, "#points button")[4].click()
     counts(browser, 5)
-    assert set(browser.text("command").rpartition(" ")[2].split(",")) == {*curve.points[4].sensors}
+    assert set(browser.text("train-command").rpartition(" ")[2].split(",")) == {*curve.points[4].sensors}
 
 
 def test_the_weakest_pair_is_confused_most_often(studio: Start) -> None:
@@ -169,7 +169,7 @@ def test_train_writes_the_build_of_the_chosen_sensors(
     counts(browser, 1)
     browser.click("add")
     counts(browser, 2)
-    have = set(browser.text("command").rpartition(" ")[2].split(","))
+    have = set(browser.text("train-command").rpartition(" ")[2].split(","))
     browser.click("train")
     browser.wait(lambda: browser.texts("#facts li"))
     manifest = Build.load(tmp_path / "recorded" / "build").manifest
@@ -288,7 +288,7 @@ def test_sets_are_used_left_aside_and_said_not_to_fit(
     assert left[1].startswith("another glove.grasps is left aside: another glove.grasps lacks 2 joints")
     browser.click("add")
     counts(browser, 1)
-    command = browser.text("command")
+    command = browser.text("train-command")
     merged = f"{tmp_path}/recorded.grasps"
     sets = f"{folder}/more.grasps {folder}/set.grasps"
     assert command.startswith(f"thenar merge {sets} -o {merged} && thenar compile {merged} -o ")
@@ -296,20 +296,22 @@ def test_sets_are_used_left_aside_and_said_not_to_fit(
     for name in (0, 1, 3):
         boxes[name].send_keys(Keys.SPACE)
     browser.wait(lambda: not browser.texts("#unused li"))
-    browser.wait(lambda: browser.text("command").startswith(f"thenar compile {folder}/set.grasps -o "))
+    browser.wait(lambda: browser.text("train-command").startswith(f"thenar compile {folder}/set.grasps -o "))
     counts(browser, 1)
     assert Project(folder, opened.project.hand()).state.aside == ("another glove.grasps", "more.grasps", "torn.grasps")
     assert browser.axe() == []
 
 
-def test_the_command_applies_the_edits_and_can_be_run(studio: Start, people: GraspSet, tmp_path: Path) -> None:
+def test_the_commands_apply_the_edits_and_measure_the_same(
+    studio: Start, people: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """The shell's words make the set that the page trains on."""
     opened, folder = studio(), tmp_path / "recorded"
     change(folder / "edits.jsonl", trials_of("set.grasps", people)[:5], "")
     opened.changed()
     answers(opened)
-    command = reply(opened, {"do": "choose", "sensors": [0, 8]}, "quick")
-    merge, compiled = command["command"].split(" && ")
+    commands = reply(opened, {"do": "choose", "sensors": [0, 8]}, "quick")["commands"]
+    merge, compiled = commands["train"].split(" && ")
     sets = f"{folder}/set.grasps --edits {folder}/edits.jsonl"
     assert merge == f"thenar merge {sets} -o {tmp_path}/recorded.grasps"
     assert compiled.startswith(f"thenar compile {tmp_path}/recorded.grasps -o {folder}/build ")
@@ -320,6 +322,12 @@ def test_the_command_applies_the_edits_and_can_be_run(studio: Start, people: Gra
         == opened.project.recordings()[0].fingerprint()
         == people.rows(np.arange(5, 72)).fingerprint()
     )
+    assert commands["curve"] == f"{merge} && thenar place {tmp_path}/recorded.grasps"
+    capsys.readouterr()
+    assert run([*commands["measure"].split(" && ")[1].split()[1:], "--json"]) == 0
+    (point,) = json.loads(capsys.readouterr().out)["points"]
+    shown = reply(opened, {"do": "measure", "sensors": [0, 8]}, "measure")["points"][0]
+    assert (point["mean"], point["low"]) == pytest.approx((shown["mean"], shown["low"]))
 
 
 def test_a_point_of_the_front_says_what_it_is_and_is_chosen(browser: Browser, studio: Start) -> None:
@@ -342,7 +350,7 @@ def test_a_point_of_the_front_says_what_it_is_and_is_chosen(browser: Browser, st
     names = browser.text("point-sensors").split(", ")
     browser.driver.find_element(By.ID, "point-choose").send_keys(Keys.ENTER)
     counts(browser, 4)
-    assert {*browser.text("command").rpartition(" ")[2].split(",")} == {*names}
+    assert {*browser.text("train-command").rpartition(" ")[2].split(",")} == {*names}
 
 
 def test_what_was_measured_is_not_shown_of_recordings_that_changed(

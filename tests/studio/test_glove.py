@@ -135,6 +135,7 @@ def test_a_glove_is_connected_from_an_empty_folder(
     assert len(browser.texts("#columns tr")) == 5
     assert not (folder / "glove.toml").exists()
     shown = browser.text("proposal")
+    assert browser.text("find-command") == f"thenar doctor --line {line.port} --propose {folder}/glove.toml"
     assert browser.axe() == []
     browser.picture("glove-found")
     browser.click("connect")
@@ -179,6 +180,8 @@ def test_pads_are_calibrated_and_named_in_the_harness(
     harness_in(folder, line.port)
     open_glove(browser, studio(None))
     browser.wait(lambda: browser.texts("#calibrate button") == ["Calibrate the pads"])
+    command = f"thenar calibrate {folder}/glove.toml --overwrite --subject me --taxels -o {folder}/taxels.toml"
+    assert browser.texts("#calibrate code") == [command]
     browser.driver.find_element(By.CSS_SELECTOR, "#calibrate button").click()
     key(browser, "accept")
     browser.wait(lambda: browser.text("step") == "Pads pressed")

@@ -124,6 +124,7 @@ def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
     open_record(browser, page)
     begin(browser)
     browser.wait(lambda: stage(browser, "accept"))
+    assert browser.text("record-command").startswith(f"thenar record --glove {folder}/glove.toml --subject ")
     assert browser.script("return document.activeElement.dataset.key") == "accept"
     assert browser.axe() == []
     browser.driver.switch_to.active_element.send_keys(Keys.ENTER)
