@@ -7,7 +7,7 @@ const WORDS_MS = 200; // numbers and words change five times a second, so that t
 const SETTLED_MS = 1000; // a text must be stable this long before it is read out
 const QUIET_MS = 3000; // minimum time between two texts
 const SHOWN = 8;
-const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
+const LOOK_MS = 100;
 
 // Of each health: its colour and sign, and what it means.
 const HEALTHS = {
@@ -18,9 +18,14 @@ const HEALTHS = {
   "no data": ["bad", ""],
 };
 
+/** Shows moments. Old data, and all data while the link is down, is greyed, and #age says why. */
 export class View {
+  #link = null; // whether there is one; null before the first
+  #readAt = null; // when the newest data was read
+  #silent = Infinity; // how long a moment is current, in milliseconds: moments of a recording have no age
+  #old = false;
+
   constructor() {
-    this.state = new State((old) => this.#aged(old));
     this.frame = null;
     this.shown = null;
     this.drawing = null;
@@ -30,13 +35,16 @@ export class View {
     this.later = null;
     this.drawn = true; // what came last
     this.said = { text: "", at: 0, since: 0, candidate: "" };
+    setInterval(() => this.#look(), LOOK_MS);
   }
 
-  /** Take the grasp types, switches and joints of the build, and whether its moments are those of a run. */
-  build(build, live) {
-    this.state.live = live;
+  /** Take the grasp types, switches, joints and hand of the build, and how long a moment of its run is current. */
+  begin(build) {
+    this.#silent = (build.silent_us ?? Infinity) / 1000;
     this.switches = build.switches;
     this.joints = build.joints;
+    this.taxels = build.hand.taxels;
+    this.drawing = drawHand($("hand"), build.hand);
     const styles = typeStyles(build.grasps);
     this.rows = new Map(build.grasps.map((grasp) => {
       const full = make("span"), share = make("span", { class: "share" }), bar = make("div", { class: "bar" }, full);
@@ -48,18 +56,18 @@ export class View {
     $("empty-hand").hidden = build.empty_hand;
   }
 
-  /** Take the positions of the build's inputs on the hand. */
-  setHand(hand) {
-    this.hand = hand;
-    this.drawing = drawHand($("hand"), hand, {});
+  /** Take the state of the connection to the server. */
+  link(up) {
+    this.#link = up;
+    this.#look();
   }
 
   /** Take a moment. */
   take(frame) {
     this.frame = frame;
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
-    const age = ages.length ? Math.min(...ages) : null;
-    if (this.state.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
+    if (ages.length && this.#silent < Infinity) this.#readAt = performance.now() - (Math.min(...ages) + frame.late_us) / 1000;
+    this.#look();
     this.#later();
   }
 
@@ -83,7 +91,13 @@ export class View {
     say($("spoken"), words);
   }
 
-  #aged(old) {
+  #look() {
+    const age = this.#readAt === null ? 0 : performance.now() - this.#readAt, silent = age > this.#silent;
+    const since = this.#readAt === null ? " yet" : ` since ${clock(this.#readAt)}`, old = !this.#link || silent;
+    say($("age"), this.#link === false ? `no data${since}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "");
+    if (old === this.#old) return;
+    this.#old = old;
+    document.documentElement.classList.toggle("old", old);
     this.shown = null; // everything is drawn again
     this.#later();
     this.#title();
@@ -91,7 +105,7 @@ export class View {
   }
 
   #title() {
-    const words = this.state.old ? "no data" : this.frame?.grasp;
+    const words = this.#old ? "no data" : this.frame?.grasp;
     document.title = words ? `${words} · thenar` : "thenar";
   }
 
@@ -111,7 +125,7 @@ export class View {
     const wait = news ? 0 : WORDS_MS - (now - this.words);
     if (wait <= 0) this.#numbers(frame);
     else this.later ??= setTimeout(() => this.#numbers(this.frame), wait);
-    this.#announce(this.state.old ? "no data" : frame.grasp, now);
+    this.#announce(this.#old ? "no data" : frame.grasp, now);
   }
 
   #now(frame) {
@@ -122,7 +136,7 @@ export class View {
       this.#title();
     }
     grasp.classList.toggle("unsure", frame.grasp === "unknown");
-    const health = this.state.old ? "no data" : frame.health, [is, means] = HEALTHS[health] ?? ["bad", ""];
+    const health = this.#old ? "no data" : frame.health, [is, means] = HEALTHS[health] ?? ["bad", ""];
     $("health").dataset.is = is;
     tell("health", health);
     say($("why"), means);
@@ -142,7 +156,7 @@ export class View {
     }
     this.drawing.setClosed(closed, gone);
     this.drawing.setPose((frame.joints ?? this.joints.map(() => null)).map((value, at) => (lost.has(this.joints[at]) ? null : value)));
-    this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
+    this.drawing.setTaxels(this.taxels.map(({ name }) => frame.taxels[name] ?? null));
   }
 
   #numbers(frame) {
@@ -183,58 +197,5 @@ export class View {
       Object.assign(said, { text: grasp, at: now });
       say($("spoken"), grasp);
     }
-  }
-}
-
-/**
- * Watches the age of the data, and says it in #age.
- *
- * Data is old after half a second, or after three periods of its source if these are longer. Old data, and all data while
- * the link is down, is greyed: the root element has the class "old".
- */
-class State {
-  #readAt = null;
-  #dataUs = null;
-  #intervals = [];
-  #link = null;
-
-  /** @param {function(boolean): void} changed called with whether the data is old, when that changes */
-  constructor(changed = () => {}) {
-    this.changed = changed;
-    this.live = true; // moments of a recording have no age
-    this.old = false;
-    setInterval(() => this.#look(), LOOK_MS);
-  }
-
-  /**
-   * Take the moment at which the newest data was read, on any clock, and its age now, both in microseconds; null: none
-   * was read yet.
-   */
-  data(timeUs, ageUs) {
-    if (timeUs === null) return;
-    this.#readAt = performance.now() - ageUs / 1000;
-    if (this.#dataUs !== null && timeUs > this.#dataUs) this.#intervals.push((timeUs - this.#dataUs) / 1000);
-    if (this.#intervals.length > INTERVALS) this.#intervals.shift();
-    this.#dataUs = timeUs;
-    this.#look();
-  }
-
-  /** Take the state of the connection to the server. */
-  link(up) {
-    this.#link = up;
-    this.#look();
-  }
-
-  #look() {
-    const up = Boolean(this.#link), age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
-    const middle = [...this.#intervals].sort((one, other) => one - other)[this.#intervals.length >> 1] ?? 0;
-    const silent = this.live && age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
-    const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
-    const words = this.#link === null ? "" : !up ? `no data${since || " yet"}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "";
-    say($("age"), words);
-    document.documentElement.classList.toggle("old", old);
-    if (old === this.old) return;
-    this.old = old;
-    this.changed(old);
   }
 }
