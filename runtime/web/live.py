@@ -28,8 +28,8 @@ _MOST_CHANGES = 6_000
 _SILENT_US, _PERIODS = 500_000, 3
 # The glove is looked at so often; what is said of it is repeated once a second, and is not known when it was not.
 _LOOK_US, _LASTS_S = 200_000, 3
-# What a timeline shows of a prediction: its time since 1970, the announced type, "degraded" or "unknown" health, and the
-# segment's type and beginning.
+# What a timeline shows of a prediction: its time since 1970, the announced type, "degraded" or "unknown" health, and
+# the type and the beginning of the segment.
 Change = tuple[int, str, str, str, int | None]
 _encode = msgspec.json.Encoder().encode
 _FRAME = b'{"topic":"frame",'

@@ -94,7 +94,7 @@ def test_a_glove_that_was_never_there_is_not_lost_since_some_time(
         assert hear(live)["words"] == f"{glove.devices()[0].name} not connected"
 
 
-@pytest.mark.parametrize("rate_hz, least_s, most_s", [(100, 0.5, 0.5), (0.5, 6.0, 6.5)])
+@pytest.mark.parametrize(("rate_hz", "least_s", "most_s"), [(100, 0.5, 0.5), (0.5, 6.0, 6.5)])
 def test_pages_are_told_how_long_a_moment_is_current(
     folder: Path, serve: Callable[..., Any], hear: Callable[..., Any], rate_hz: float, least_s: float, most_s: float
 ) -> None:
