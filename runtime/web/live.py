@@ -185,10 +185,11 @@ def build_message(topic: str, folder: Path, manifest: Manifest, **shows: object)
 
 
 class FrameText:
-    """Makes the text of a moment of a run of `build`: the fields of its grasp, preshape and angles as in sinks, and
+    """Makes the text of a moment of a run of `build`: the fields of its grasp as in sinks, and
 
     change         as timelines show it, with times since 1970
     late_us        its age now
+    preshape       the name of what the robot's hand should do now, or None
     closed         a character per kept switch, in the build's order: "1" closed, "0" open
     joints         the value of each joint of the build, in its unit; None while they are lost
     probabilities  of every class of the build, in order; None while too little can be read
@@ -208,8 +209,7 @@ class FrameText:
         if self._switches:
             shut = f"{0 if frame is None else frame.closed:0{self._switches}b}"[::-1]
         more = {
-            "preshape": moment.preshape,
-            "angles": moment.angles,
+            "preshape": moment.preshape and moment.preshape.name,
             "change": change_of(moment.grasp, clock_us),
             "late_us": now_us() - moment.grasp.time_us,
             "closed": shut,

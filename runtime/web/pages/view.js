@@ -173,7 +173,7 @@ export class View {
     const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)}\u00a0% in this frame`;
     const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
-    if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
+    if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape ?? "none yet"}`);
     for (const id of ["latency", "switch_age", "glove_age"]) {
       const us = frame[`${id}_us`] ?? null;
       say($(id), us === null ? "none yet" : `${(us / 1000).toFixed(1)} ms`);

@@ -219,7 +219,7 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
             "margin": 1,
         },
         **{"health": "degraded", "switch_age_us": 1, "glove_age_us": None, "latency_us": 1, "lost": [image]},
-        **{"state": "held", "segment": 1, "segment_type": SCRIPT, "segment_us": 0, "preshape": {"name": image}},
+        **{"state": "held", "segment": 1, "segment_type": SCRIPT, "segment_us": 0, "preshape": image},
         **{"closed": "1", "joints": [], "taxels": {}, "probabilities": [1.0, 0.0], "late_us": 0},
         "change": [10**15, SCRIPT, "degraded", SCRIPT, 10**15 - 1_000_000],
     }
