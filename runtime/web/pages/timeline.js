@@ -1,12 +1,12 @@
 // One axis of time for runs and recordings: lanes of spans on a canvas, a cursor, zoom, and keys. All times are in
 // microseconds since 1970.
 import { typeStyles } from "./types.js";
-import { $, clearedPen, colours, redraw, say } from "./wire.js";
+import { $, clearedPen, colours, paced, redraw, say, WORDS_MS } from "./wire.js";
 
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
-const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second, and words change so often
+const FOLLOW_MS = 100; // the lanes of a run move ten times a second at most
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
@@ -97,14 +97,14 @@ export class Timeline {
   #wide = 0;
   #whole = false; // while a recording is read, the window has all of it, until somebody zooms
   #styles = typeStyles([]);
-  #colours = null; // of the page
+  #colours = null; // of the page, as long as they and the canvas are the same
+  #pen = null;
   #pointers = new Map();
   #moved = 0;
-  #drawing = false;
   #stale = true; // the lanes, and not just the cursor
-  #drawn = 0;
-  #saying = null;
-  #said = 0;
+  #paint = paced(() => this.#draw());
+  #follow = paced(() => this.#draw(), FOLLOW_MS);
+  #say = paced(() => this.#read(), WORDS_MS);
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
   constructor(canvas, on) {
@@ -119,7 +119,11 @@ export class Timeline {
     for (const kind of ["down", "move", "up", "cancel"]) {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
-    redraw(canvas, () => this.draw());
+    redraw(canvas, () => {
+      [this.#pen, this.#wide, this.#colours] = [clearedPen(canvas), canvas.clientWidth, colours()];
+      this.#stale = true;
+      this.#draw(); // at once: it is cleared
+    });
     const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
     for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
     addEventListener("keydown", (event) => this.#key(event));
@@ -150,7 +154,9 @@ export class Timeline {
     this.first = Math.max(this.first ?? changes[0][0], until - KEPT_US);
     this.last = until;
     if (this.at === null) this.#from = until - this.#span;
-    this.draw();
+    this.#stale = true;
+    this.#follow();
+    this.#say();
   }
 
   /** Take the span of a recording and where its predictions differ from the labels. */
@@ -204,32 +210,27 @@ export class Timeline {
     return [...lanes, [`segments${of}`, ["type", segments]], [`health${of}, where it is not ok`, ["trouble", health]]];
   }
 
-  /** Draw soon; while it follows now, ten times a second. */
+  /** Draw soon: the lanes, or just the cursor. */
   draw(stale = true) {
     this.#stale ||= stale;
-    if (this.#drawing) return;
-    this.#drawing = true;
-    const wait = this.live && this.at === null ? FOLLOW_MS - (performance.now() - this.#drawn) : 0;
-    setTimeout(() => requestAnimationFrame(() => this.#paint()), Math.max(wait, 0));
-  }
-
-  #paint() {
-    [this.#drawing, this.#drawn] = [false, performance.now()];
-    const cursor = $("cursor"), share = this.at === null ? -1 : (this.at - this.#from) / this.#span;
-    if (this.#stale) this.#draw();
-    this.#stale = false;
-    cursor.hidden = share < 0 || share > 1;
-    cursor.style.transform = `translateX(${(share * this.#wide).toFixed(1)}px)`;
-    this.#saying ??= setTimeout(() => this.#say(), Math.max(FOLLOW_MS - (performance.now() - this.#said), 0));
+    this.#paint();
+    this.#say();
   }
 
   #draw() {
-    const { canvas } = this, lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, wide = canvas.clientWidth;
-    this.#wide = wide;
-    if (canvas.style.height !== `${high}px`) canvas.style.height = `${high}px`;
+    const cursor = $("cursor"), share = this.at === null ? -1 : (this.at - this.#from) / this.#span;
+    if (this.#stale) this.#drawLanes();
+    this.#stale = false;
+    cursor.hidden = share < 0 || share > 1;
+    cursor.style.transform = `translateX(${(share * this.#wide).toFixed(1)}px)`;
+  }
+
+  #drawLanes() {
+    const lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, pen = this.#pen, wide = this.#wide;
+    if (this.canvas.style.height !== `${high}px`) this.canvas.style.height = `${high}px`;
     if (!wide) return;
-    const pen = clearedPen(canvas), x = (us) => ((us - this.#from) / this.#span) * wide;
-    this.#colours = colours();
+    const x = (us) => ((us - this.#from) / this.#span) * wide;
+    pen.clearRect(0, 0, wide, high);
     pen.font = `${LETTERS}px system-ui, sans-serif`;
     pen.textBaseline = "middle";
     lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));
@@ -264,9 +265,10 @@ export class Timeline {
       pen.strokeStyle = line;
       pen.strokeRect(left + 0.5, top + 0.5, Math.max(wide - 1, 0), BAR - 1);
     }
+    if (kind === "early" || wide < LETTERS) return;
     const text = [name, code].map((one) => sign + one).find((one) => pen.measureText(one).width + 6 <= wide);
     pen.fillStyle = kind !== "type" ? page : ink ?? letters;
-    if (text && kind !== "early") pen.fillText(text, left + 3, top + BAR / 2 + 1);
+    if (text) pen.fillText(text, left + 3, top + BAR / 2 + 1);
   }
 
   #axis(pen, x, wide, high) {
@@ -281,8 +283,7 @@ export class Timeline {
     }
   }
 
-  #say() {
-    [this.#saying, this.#said] = [null, performance.now()];
+  #read() {
     const { canvas, reading, last, first } = this, moved = this.at !== null || !this.live;
     say($("place"), reading);
     $("now").hidden = !this.live || this.at === null;

@@ -1,9 +1,8 @@
 // The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
 import { chip, typeStyles } from "./types.js";
-import { $, clock, fillTable, list, make, say, tell } from "./wire.js";
+import { $, clock, fillTable, list, make, paced, say, tell, WORDS_MS } from "./wire.js";
 
-const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
 const SETTLED_MS = 1000; // a text must be stable this long before it is read out
 const QUIET_MS = 3000; // minimum time between two texts
 const SHOWN = 8;
@@ -24,22 +23,20 @@ export class View {
   #readAt = null; // when the newest data was read
   #silent = Infinity; // how long a moment is current, in milliseconds: moments of a recording have no age
   #old = false;
+  #draw = paced(() => this.frame && this.#show());
+  #say = paced(() => this.frame && this.#words(), WORDS_MS);
 
   constructor() {
     this.frame = null;
-    this.shown = null;
-    this.drawing = null;
     this.rows = new Map();
     this.quarantined = [];
-    this.words = 0;
-    this.later = null;
-    this.drawn = true; // what came last
     this.said = { text: "", at: 0, since: 0, candidate: "" };
     setInterval(() => this.#look(), LOOK_MS);
   }
 
   /** Take the grasp types, switches, joints and hand of the build, and how long a moment of its run is current. */
   begin(build) {
+    this.frame = null; // what comes next is drawn, even if it is the same
     this.#silent = (build.silent_us ?? Infinity) / 1000;
     this.switches = build.switches;
     this.joints = build.joints;
@@ -64,11 +61,14 @@ export class View {
 
   /** Take a moment. */
   take(frame) {
+    if (frame === this.frame) return;
+    const news = frame.grasp !== this.frame?.grasp;
     this.frame = frame;
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     if (ages.length && this.#silent < Infinity) this.#readAt = performance.now() - (Math.min(...ages) + frame.late_us) / 1000;
     this.#look();
-    this.#later();
+    this.#draw();
+    this.#say(news);
   }
 
   /** Take the health of devices and inputs. */
@@ -98,9 +98,8 @@ export class View {
     if (old === this.#old) return;
     this.#old = old;
     document.documentElement.classList.toggle("old", old);
-    this.shown = null; // everything is drawn again
-    this.#later();
     this.#title();
+    this.#draw();
     if (old) this.#announce("no data", performance.now(), true);
   }
 
@@ -109,43 +108,32 @@ export class View {
     document.title = words ? `${words} · thenar` : "thenar";
   }
 
-  #later() {
-    if (this.drawn) requestAnimationFrame(() => this.#draw());
-    this.drawn = false;
-  }
-
-  #draw() {
-    this.drawn = true;
-    const { frame } = this, now = performance.now();
-    if (frame === null || frame === this.shown) return;
-    const news = this.shown?.grasp !== frame.grasp;
-    this.shown = frame;
-    this.#now(frame);
-    this.#hand(frame);
-    const wait = news ? 0 : WORDS_MS - (now - this.words);
-    if (wait <= 0) this.#numbers(frame);
-    else this.later ??= setTimeout(() => this.#numbers(this.frame), wait);
-    this.#announce(this.#old ? "no data" : frame.grasp, now);
-  }
-
-  #now(frame) {
-    const grasp = $("grasp");
+  #show() {
+    const { frame } = this, grasp = $("grasp"), [closed, gone] = this.#closed();
     if (grasp.textContent !== frame.grasp) {
       grasp.textContent = frame.grasp;
       grasp.style.setProperty("--letters", String([...frame.grasp].length));
       this.#title();
     }
     grasp.classList.toggle("unsure", frame.grasp === "unknown");
-    const health = this.#old ? "no data" : frame.health, [is, means] = HEALTHS[health] ?? ["bad", ""];
+    const health = this.#old ? "no data" : frame.health, [is, means] = HEALTHS[health];
     $("health").dataset.is = is;
     tell("health", health);
     say($("why"), means);
+    this.drawing.setClosed(closed, gone);
+    this.drawing.setPose((frame.joints ?? []).map((value, at) => (frame.lost.includes(this.joints[at]) ? null : value)));
+    this.drawing.setTaxels(this.taxels.map(({ name }) => frame.taxels[name] ?? null));
+    this.#announce(this.#old ? "no data" : frame.grasp, performance.now());
   }
 
-  #hand(frame) {
-    if (!this.drawing) return;
-    const lost = new Set(frame.lost), gone = this.switches.map((name) => lost.has(name));
-    const closed = gone.map((missing, bit) => !missing && frame.closed[bit] === "1");
+  // Which switches are lost, and which of the others are closed.
+  #closed() {
+    const { closed, lost } = this.frame, gone = this.switches.map((name) => lost.includes(name));
+    return [gone.map((missing, bit) => !missing && closed[bit] === "1"), gone];
+  }
+
+  #words() {
+    const { frame } = this, [closed, gone] = this.#closed();
     if (this.switches.length) {
       const names = this.switches.filter((_, bit) => closed[bit]);
       const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
@@ -154,15 +142,6 @@ export class View {
       const said = `${names.length} of ${counted}`;
       say($("hand-says"), `${said}${names.length ? ": " : ""}${names.slice(0, SHOWN).join(", ")}${more}`);
     }
-    this.drawing.setClosed(closed, gone);
-    this.drawing.setPose((frame.joints ?? this.joints.map(() => null)).map((value, at) => (lost.has(this.joints[at]) ? null : value)));
-    this.drawing.setTaxels(this.taxels.map(({ name }) => frame.taxels[name] ?? null));
-  }
-
-  #numbers(frame) {
-    clearTimeout(this.later);
-    this.later = null;
-    this.words = performance.now();
     for (const [at, [grasp, { row, full, share }]] of [...this.rows].entries()) {
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
       full.style.transform = `scaleX(${value ?? 0})`;
