@@ -62,7 +62,7 @@ class LivePage:
         # Where the monotonic clock of moments began, since 1970.
         self._clock_us = time_ns() // 1000 - now_us()
         # For pages opened later.
-        self._past = Past() if after is None else after._past
+        self._past: Past = Past() if after is None else after._past
         self._past.silent_us = silent_us(glove.sources.switch_period_us, glove.sources.glove_period_us)
         # The devices that are lost, and since when; and what was said of the glove.
         self._lost, self._said, self._due_us = dict[str, str](), ("", ""), 0

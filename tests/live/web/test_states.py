@@ -239,6 +239,35 @@ def test_the_past_that_a_page_keeps_is_bounded(page: Callable[..., Run], browser
     run.until(lambda: browser.text("grasp") == "Add")
 
 
+# The frames in which three painters ran: one at any time, one once, and one every 50 ms.
+_PACED = """const [done] = arguments;
+    import("/wire.js").then(async ({ paced }) => {
+      const seen = { often: [], once: [], again: [] }, frame = () => new Promise(requestAnimationFrame);
+      const painter = (name) => () => seen[name].push(document.timeline.currentTime);
+      const often = paced(painter("often")), once = paced(painter("once"), 1e9), again = paced(painter("again"), 50);
+      for (let call = 0; call < 5; call++) {
+        for (const ask of [often, once, again, often, once]) ask();
+        await frame();
+      }
+      const [start] = seen.again, last = seen.again.length;
+      again();
+      while (seen.again.length === last) await frame();
+      once(true);
+      await frame();
+      done([seen, start]);
+    });"""
+
+
+def test_what_is_painted_at_one_time_is_painted_in_one_frame(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    seen, start = browser.driver.execute_async_script(_PACED)
+    assert len(set(seen["often"])) == len(seen["often"]) == 5
+    assert seen["often"][0] == seen["once"][0] == start
+    # The last call counts, however soon it came; and what is asked for at once is not put off.
+    assert len(seen["once"]) == 2
+    run.until(lambda: browser.text("grasp") == "Add")
+
+
 def recording(predictions: list[Any], others: list[Any], truth: list[Any]) -> dict[str, Any]:
     """Return what an overview says of two builds."""
     changes = [[(time_us, grasp, "", "", None) for time_us, grasp in some] for some in (predictions, others)]
