@@ -66,8 +66,9 @@ class LivePage:
         self._past.silent_us = silent_us(glove.sources.switch_period_us, glove.sources.glove_period_us)
         # The devices that are lost, and since when; and what was said of the glove.
         self._lost, self._said, self._due_us = dict[str, str](), ("", ""), 0
-        shows = {"silent_us": self._past.silent_us, "preshapes": glove.has_preshapes}
-        server.publish("build", build_message("build", folder, glove.system.build.manifest, **shows))
+        manifest, silent = glove.system.build.manifest, self._past.silent_us
+        about = build_message("build", folder, manifest, silent_us=silent, preshapes=glove.has_preshapes)
+        server.publish("build", about)
         server.publish("past", self._past_message)
 
     def show(self, moment: Moment) -> None:
@@ -169,11 +170,13 @@ def shell_message(
     return message("shell", project=project, build=build, rate=rate, pages=pages, wearer=wearer)
 
 
-def build_message(topic: str, folder: Path, manifest: Manifest, **shows: object) -> bytes:
+def build_message(topic: str, folder: Path, manifest: Manifest, *, silent_us: int | None, **shows: object) -> bytes:
     """Return a message on the build in a folder: its name, types, switches and joints, whether it knows an empty hand,
-    the drawing of the hand, and what else the page `shows`. Raises BuildError if the drawing is damaged.
+    the drawing of the hand, how long a moment of its run is current, or None for a recording, and what else the page
+    `shows`. Raises BuildError if the drawing is damaged.
     """
     known = {
+        "silent_us": silent_us,
         "name": folder.resolve().name,
         "grasps": manifest.classes,
         "switches": [switch.name for switch in manifest.switches],

@@ -132,9 +132,8 @@ export class Timeline {
   /** Take what is known of the build of a run, or of those of a recording. */
   begin({ grasps, builds, silent_us }) {
     this.#styles = typeStyles([...grasps, "none", "unknown"]);
-    this.live = !builds;
-    if (builds) this.tracks = builds.map((name) => new Track(builds.length > 1 ? name : ""));
-    else this.#silent = silent_us;
+    [this.live, this.#silent] = [silent_us !== null, silent_us];
+    if (!this.live) this.tracks = builds.map((name) => new Track(builds.length > 1 ? name : ""));
   }
 
   /** Take changes of a run, of which some may be known already, and the time until which they are all. */

@@ -280,7 +280,7 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
     second = [(0, "none"), (600_000, "Add"), (2_000_000, "PoS"), (2_200_000, "Add")]
     truth = [(1, 500_000, 3_000_000, "Add"), (2, 4_000_000, 8_000_000, "Add"), (3, 8_500_000, 9_000_000, "PoS")]
     overview = recording(first, second, [*truth, (4, 8_100_000, 8_200_000, "Add"), (4, 0, 0, "")])
-    about = BUILD | {"builds": ["old", "new"]}
+    about = BUILD | {"builds": ["old", "new"], "silent_us": None}
 
     def reply(asked: Any) -> bytes:
         if asked["do"] == "overview":
