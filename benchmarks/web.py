@@ -136,8 +136,8 @@ window.WebSocket = class extends Socket {
       seen.messages++;
       seen.bytes += data.length;
       if (!data.startsWith('{"topic":"frame"')) return;
-      const { unix_us } = JSON.parse(data), { port1, port2 } = new MessageChannel();
-      port1.onmessage = () => seen.ages.push(performance.timeOrigin + performance.now() - unix_us / 1000);
+      const [, us] = data.match(/"unix_us":([0-9]+)/), { port1, port2 } = new MessageChannel();
+      port1.onmessage = () => seen.ages.push(performance.timeOrigin + performance.now() - us / 1000);
       requestAnimationFrame(() => port2.postMessage(0));
     });
   }

@@ -56,7 +56,7 @@ class Replay(Closing):
     manifest : Manifest
         That of the first build.
     about : bytes
-        The message "replay": what `build_message` says of the first build, the names of all, and the hand.
+        The message "replay": what `build_message` says of the first build, and the names of recording and builds.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class Replay(Closing):
         names = [build.resolve().name for build in builds]
         if len(set(names)) < len(names):
             names = [str(build) for build in builds]
-        self.about = build_message("replay", builds[0], manifest, silent_us=None, builds=names)
+        self.about = build_message("replay", builds[0], manifest, silent_us=None, name=path.name, builds=names)
         # What was read so far: its span; by build the changes; the labels; of each kept moment its time and where its
         # text ends.
         self._first_us: int | None = None

@@ -83,7 +83,7 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
     (final,) = asked(shown, "moments", last + 10**9, last + 2 * 10**9, 1)["frames"]
     assert last - 10_000 <= final["change"][0] <= last
     about = json.loads(shown.about)
-    assert (about["topic"], about["name"], about["builds"]) == ("replay", folder.name, [folder.name])
+    assert (about["topic"], about["name"], about["builds"]) == ("replay", "anna.mcap", [folder.name])
 
 
 def test_a_result_that_is_undone_leaves_no_label(folder: Path, tmp_path: Path) -> None:
