@@ -112,8 +112,8 @@ export function fillMenu(menu, members, usual = "") {
 export const WORDS_MS = 200; // numbers and words change five times a second at most, so that they can be read
 
 /**
- * Return what lets `paint` run in the next frame of the screen, and at most every so many milliseconds: when it is called
- * more often, the last call counts. So all that comes at one time is painted in one frame.
+ * Return the function that lets `paint` run in the next frame of the screen, but not again within `ms` milliseconds: of
+ * calls that come sooner, the last one counts. So all that comes at one time is painted in one frame.
  * @returns {function(boolean=): void} `atOnce` is in the next frame in any case
  */
 export function paced(paint, ms = 0) {
