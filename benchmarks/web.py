@@ -7,9 +7,10 @@ both. Each case is a line: CPU of the run's thread per frame, and its increase o
 us); wall time from a frame to its grasp; the load of the server's thread on a core; the frames per second that the
 readers received. Readers are WebSockets in a separate process, on the same cores.
 
-A second table is of the page in Chromium, if it is there, for a glove of 100 frames per second. It has the time from a
-frame until the page has drawn it (95 % within 60 ms), and updates per second. It has the load of the page's process on
-a core (at most 15 %), messages and bytes per second, and the heap when it began and at the end.
+A second table is of the page in Chromium, if it is there, for a glove of 100 frames per second, and for a recording of
+it that plays. It has the time from a frame until the page has drawn it (95 % within 60 ms), and updates per second. It
+has the load of the page's process on a core (at most 15 %), messages and bytes per second, and the heap when it began
+and at the end.
 """
 
 import argparse
@@ -22,6 +23,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -35,6 +37,7 @@ from rich.table import Table
 from thenar.runtime import Glove
 from thenar.runtime.frames import now_us
 from thenar.runtime.web.live import LivePage
+from thenar.runtime.web.replay import Replay
 from thenar.runtime.web.server import Server
 
 if TYPE_CHECKING:
@@ -87,10 +90,12 @@ def measured(cases: Sequence[Case], frames: list[tuple[int, bytes]]) -> None:
             case.wall_us.append((time.perf_counter_ns() - wall) / 1e3)
 
 
-def run_of(scene: Played, folder: Path, what: str, stack: ExitStack, *, page: bool) -> tuple[Case, LivePage | None]:
+def run_of(
+    scene: Played, what: str, stack: ExitStack, *, page: bool, record: Path | None = None
+) -> tuple[Case, LivePage | None]:
     """Return a run with a sink, and its page."""
     harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
-    run = Glove(scene.build, harness, sinks=["jsonl:/dev/null?every"], status=True, feed=feed.take)
+    run = Glove(scene.build, harness, sinks=["jsonl:/dev/null?every"], status=True, feed=feed.take, record=record)
     if not page:
         stack.enter_context(run)
         return Case(what, lambda: next(run), feed), None
@@ -131,8 +136,8 @@ window.WebSocket = class extends Socket {
       seen.messages++;
       seen.bytes += data.length;
       if (!data.startsWith('{"topic":"frame"')) return;
-      const { unix_us } = JSON.parse(data), { port1, port2 } = new MessageChannel();
-      port1.onmessage = () => seen.ages.push(performance.timeOrigin + performance.now() - unix_us / 1000);
+      const [, us] = data.match(/"unix_us":([0-9]+)/), { port1, port2 } = new MessageChannel();
+      port1.onmessage = () => seen.ages.push(performance.timeOrigin + performance.now() - us / 1000);
       requestAnimationFrame(() => port2.postMessage(0));
     });
   }
@@ -141,47 +146,67 @@ window.WebSocket = class extends Socket {
 PAGE_HZ = 100
 
 
-def in_chromium(scene: Played, seconds: float) -> Iterator[tuple[str, ...]]:
-    """Yield the lines of the page in Chromium: of a hand that changes, and of one at rest."""
+def in_chromium(scene: Played, seconds: float, recording: Path) -> Iterator[tuple[str, ...]]:
+    """Yield the lines of the page in Chromium: of runs, of which the first is recorded, and of that recording."""
     from selenium import webdriver
 
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium") or ""
     for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000"):
         options.add_argument(flag)
-    for what, every in (
-        ("a hand that grasps", PAGE_HZ),
-        ("a hand at rest", 0),
-        ("all inputs by chance, in each frame", 1),
+    frames = restless(len(scene.kept), round(PAGE_HZ * (seconds + 2)), seed=1)
+    grasping = [frames[number // PAGE_HZ * PAGE_HZ] for number in range(len(frames))]
+    for what, shown, record in (
+        ("a hand that grasps", grasping, recording),
+        ("all inputs by chance, in each frame", frames, None),
+        ("a recording of the first, played", None, None),
     ):
         service = webdriver.ChromeService(executable_path=shutil.which("chromedriver"))
         driver = webdriver.Chrome(options=options, service=service)
         with ExitStack() as stack:
             stack.callback(driver.quit)
-            case, page = run_of(scene, scene.folder, what, stack, page=True)
-            assert page is not None
             driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": WATCH})
-            driver.get(page.server.url)
-            frames = restless(len(scene.kept), round(PAGE_HZ * (seconds + 2)), seed=1)
-            chosen = [frames[number // every * every if every else 0] for number in range(len(frames))]
-            fed(case, chosen[: 2 * PAGE_HZ])
+            if shown is None:
+                driver.get(stack.enter_context(played_back(recording, scene.folder)).url)
+                time.sleep(2)  # it is read
+                driver.find_element("id", "play").click()
+                pass_time = partial(time.sleep, seconds)
+            else:
+                case, page = run_of(scene, what, stack, page=True, record=record)
+                assert page is not None
+                driver.get(page.server.url)
+                fed(case, shown[: 2 * PAGE_HZ])
+                pass_time = partial(fed, case, shown[2 * PAGE_HZ :])
             # Drivers cannot be called while frames are fed by this thread: what is measured is measured at both ends.
             driver.execute_script("seen = { ages: [], messages: 0, bytes: 0 }")
             process = service.process.pid
             heap, start, busy = heap_of(driver), time.perf_counter(), renderer_s(process)
-            fed(case, chosen[2 * PAGE_HZ :])
+            pass_time()
             passed = time.perf_counter() - start
             share, seen = (renderer_s(process) - busy) / passed, driver.execute_script("return seen")
-            ages = np.percentile(seen["ages"], (50, 95))
+            ages = np.percentile(seen["ages"] or [0], (50, 95))
             yield (
                 what,
-                f"{ages[0]:.0f} ms, {ages[1]:.0f} ms",
-                f"{len(seen['ages']) / passed:.0f}",
+                f"{ages[0]:.0f} ms, {ages[1]:.0f} ms" if shown else "",
+                f"{len(seen['ages']) / passed:.0f}" if shown else "",
                 f"{share:.1%}",
                 f"{seen['messages'] / passed:.0f}",
                 f"{seen['bytes'] / passed / 1e3:.0f} kB",
                 f"{heap:.1f} to {heap_of(driver):.1f} MB",
             )
+
+
+@contextmanager
+def played_back(recording: Path, build: Path) -> Iterator[Server]:
+    """Serve the page of a recording."""
+    with (
+        Replay(recording, [build]) as replay,
+        Server(
+            "live", "127.0.0.1:0", token=None, on_message=lambda asked: replay.reply(asked["do"], asked.get("numbers"))
+        ) as server,
+    ):
+        server.publish("replay", replay.about)
+        yield server
 
 
 def fed(case: Case, frames: Sequence[tuple[int, bytes]]) -> None:
@@ -239,33 +264,24 @@ def main() -> None:
             ("ten browsers", 10, 0),
             ("ten, and one that hangs", 10, 1),
         ):
-            for case in compared(scene, Path(name), what, number, hanging, options.frames) if options.frames else ():
+            for case in compared(scene, what, number, hanging, options.frames) if options.frames else ():
                 table.add_row(*case)
         console.print(table)
         if shutil.which("chromium") is not None:
             table = Table(title="The page in Chromium (95 % of frames within 60 ms, at most 15 % of a core)")
-            for title in (
-                "",
-                "frame to page: median, 95 %",
-                "updates/s",
-                "renderer",
-                "messages/s",
-                "per second",
-                "heap",
-            ):
+            titles = ("", "frame to page: median, 95 %", "updates/s", "renderer", "messages/s", "per second", "heap")
+            for title in titles:
                 table.add_column(title, justify="right" if table.columns else "left")
-            for line in in_chromium(scene, options.seconds):
+            for line in in_chromium(scene, options.seconds, Path(name) / "run.mcap"):
                 table.add_row(*line)
             console.print(table)
 
 
-def compared(
-    scene: Played, folder: Path, what: str, number: int, hanging: int, frames: int
-) -> Iterator[tuple[str, ...]]:
+def compared(scene: Played, what: str, number: int, hanging: int, frames: int) -> Iterator[tuple[str, ...]]:
     """Yield the line of a run without a page, and that of one with."""
     with ExitStack() as stack:
-        plain, _ = run_of(scene, folder, "  no page", stack, page=False)
-        shown, page = run_of(scene, folder, what, stack, page=True)
+        plain, _ = run_of(scene, "  no page", stack, page=False)
+        shown, page = run_of(scene, what, stack, page=True)
         assert page is not None
         found: list[str] = []
         clock = time.pthread_getcpuclockid(page.server.thread.ident or 0)

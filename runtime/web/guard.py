@@ -91,7 +91,7 @@ class Guard:
         if not self._loopback:
             own = socket.gethostname().lower()
             self._names |= {own, f"{own.partition('.')[0]}.local"}
-        self.cookie, self.secret = f"thenar-{port}", secrets.token_urlsafe(24)
+        self.cookie, self.secret = f"thenar-{port}", new_token()
 
     def knows_host(self, host: str) -> bool:
         """Return whether a Host header is one that no other site can have."""

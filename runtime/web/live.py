@@ -3,11 +3,10 @@
 In the loop of the run a moment costs a reference or two; its text is made on the server's thread, if a page is open.
 """
 
-from collections import deque
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from time import localtime, strftime, time
+from time import localtime, strftime, time, time_ns
 
 import msgspec
 
@@ -25,12 +24,12 @@ from .server import Server, message
 
 # Changes that a page opened later gets: ten minutes of a hand that is never still.
 _MOST_CHANGES = 6_000
-# A time without moments is unknown. A source is silent after half a second, or after three of its periods.
-_GAP_US, _SILENT_US, _PERIODS = 1_000_000, 500_000, 3
+# A moment is current for half a second, or for three periods of its source.
+_SILENT_US, _PERIODS = 500_000, 3
 # The glove is looked at so often; what is said of it is repeated once a second, and is not known when it was not.
 _LOOK_US, _LASTS_S = 200_000, 3
-# What a timeline shows of a prediction: its time, the announced type, "degraded" or "unknown" health, and the segment's
-# type and beginning.
+# What a timeline shows of a prediction: its time since 1970, the announced type, "degraded" or "unknown" health, and
+# the type and the beginning of the segment.
 Change = tuple[int, str, str, str, int | None]
 _encode = msgspec.json.Encoder().encode
 _FRAME = b'{"topic":"frame",'
@@ -42,7 +41,7 @@ class LivePage:
     Parameters
     ----------
     server : Server
-        The server, on which the topics "build", "hand", "past", "frame", "health" and "glove" are published.
+        The server, on which the topics "build", "past", "frame", "health" and "glove" are published.
     glove : Glove
         The running glove.
     folder : Path
@@ -60,29 +59,24 @@ class LivePage:
         self.server, self._glove = server, glove
         self._frames = FrameText(glove.system.build, glove.system.harness)
         self._health: HealthReport | None = None
-        # The latest changes of the prediction, for pages opened later.
-        self._past: deque[Change] = deque(maxlen=_MOST_CHANGES) if after is None else after._past
-        self._until_us: int = 0 if after is None else after._until_us
+        # Where the monotonic clock of moments began, since 1970.
+        self._clock_us = time_ns() // 1000 - now_us()
+        # For pages opened later.
+        self._past: Past = Past() if after is None else after._past
+        self._past.silent_us = silent_us(glove.sources.switch_period_us, glove.sources.glove_period_us)
         # The devices that are lost, and since when; and what was said of the glove.
         self._lost, self._said, self._due_us = dict[str, str](), ("", ""), 0
-        periods = glove.sources.switch_period_us, glove.sources.glove_period_us
-        self._silent_us = max(_SILENT_US, *(_PERIODS * (period or 0) for period in periods))
-        manifest = glove.system.build.manifest
-        about = build_message("build", manifest, folder.resolve().name, preshapes=glove.has_preshapes)
+        manifest, silent = glove.system.build.manifest, self._past.silent_us
+        about = build_message("build", folder, manifest, silent_us=silent, preshapes=glove.has_preshapes)
         server.publish("build", about)
-        server.publish("hand", message("hand", load_hand(folder, manifest)))
         server.publish("past", self._past_message)
 
     def show(self, moment: Moment) -> None:
         """Show the moment that the glove has just published. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
-        self.server.publish("frame", partial(self._frames, moment))
-        change = change_of(grasp)
-        if self._past and grasp.time_us - self._until_us > _GAP_US:
-            self._past.append((self._until_us, "", "", "", None))
-        if not self._past or change[1:] != self._past[-1][1:]:
-            self._past.append(change)
-        self._until_us = grasp.time_us
+        self.server.publish("frame", partial(self._frames, moment, self._clock_us))
+        self._past.take(change_of(grasp, self._clock_us))
+        del self._past.changes[:-_MOST_CHANGES]
         health, known = glove.health, self._health
         if health is not None and health is not known:
             gone = [device.name for device in health.devices if not device.connected]
@@ -102,18 +96,19 @@ class LivePage:
             return "bad", ", ".join(f"{name} {state}" for name, state in self._lost.items())
         if age_us is None:
             return "warn", "sends nothing yet"
-        if age_us > self._silent_us:
+        if age_us > self._past.silent_us:
             return "bad", self._said[1] if self._said[1].startswith("silent") else f"silent since {_clock(age_us)}"
         return "good", "connected"
 
     def _glove_message(self, level: str, words: str) -> bytes:
         """Return the message on the glove's state, which is old if the run has stopped since."""
-        if now_us() - self._until_us > 1_000_000 * _LASTS_S:
-            level, words = "bad", f"silent since {_clock(now_us() - self._until_us)}"
+        ago_us = self._clock_us + now_us() - self._past.until_us
+        if ago_us > 1_000_000 * _LASTS_S:
+            level, words = "bad", f"silent since {_clock(ago_us)}"
         return message("glove", {"is": level}, words=words, lasts_s=_LASTS_S)
 
     def _past_message(self) -> bytes:
-        return message("past", changes=list(self._past.copy()), until_us=self._until_us)
+        return message("past", changes=[*self._past.changes], until_us=self._past.until_us)
 
 
 def _clock(ago_us: int) -> str:
@@ -121,11 +116,36 @@ def _clock(ago_us: int) -> str:
     return strftime("%H:%M:%S", localtime(time() - ago_us / 1e6))
 
 
-def change_of(grasp: LiveGrasp) -> Change:
-    """Return a prediction as timelines show it. A segment that forms may still be revoked."""
+class Past:
+    """The changes of a build's prediction, in the order of their times, and until when they are all."""
+
+    def __init__(self, silent_us: int = _SILENT_US) -> None:
+        self.changes, self.until_us, self.silent_us = list[Change](), 0, silent_us
+
+    def take(self, change: Change) -> bool:
+        """Take the next moment's, and return whether it differs from the last; after a silence nothing is known."""
+        time_us, *shown = change
+        if self.changes and time_us - self.until_us > self.silent_us:
+            self.changes.append((self.until_us, "", "", "", None))
+        self.until_us = max(self.until_us, time_us)
+        # Clocks of two sessions of a recording may overlap.
+        if self.changes and (shown == list(self.changes[-1][1:]) or time_us < self.changes[-1][0]):
+            return False
+        self.changes.append(change)
+        return True
+
+
+def silent_us(*periods_us: int | None) -> int:
+    """Return how long a moment is current that rests on sources of these periods."""
+    return max(_SILENT_US, *(_PERIODS * (period or 0) for period in periods_us))
+
+
+def change_of(grasp: LiveGrasp, clock_us: int) -> Change:
+    """Return a prediction as timelines show it; its clock began at `clock_us`. A segment that forms may be revoked."""
     began_us = grasp.segment_us if grasp.state in ("held", "releasing") else None
     health = grasp.health if grasp.health in ("degraded", "unknown") else ""
-    return grasp.time_us, grasp.grasp, health, "" if began_us is None else grasp.segment_type, began_us
+    segment = ("", None) if began_us is None else (grasp.segment_type, began_us + clock_us)
+    return grasp.time_us + clock_us, grasp.grasp, health, *segment
 
 
 def shell_message(
@@ -150,24 +170,29 @@ def shell_message(
     return message("shell", project=project, build=build, rate=rate, pages=pages, wearer=wearer)
 
 
-def build_message(topic: str, manifest: Manifest, name: str, **shows: object) -> bytes:
-    """Return a message on a build: its name, types, switches and joints, whether it knows an empty hand, and what else
-    the page `shows`.
+def build_message(topic: str, folder: Path, manifest: Manifest, *, silent_us: int | None, **shows: object) -> bytes:
+    """Return a message on the build in a folder: its name, types, switches and joints, whether it knows an empty hand,
+    the drawing of the hand, how long a moment of its run is current, or None for a recording, and what else the page
+    `shows`. Raises BuildError if the drawing is damaged.
     """
     known = {
-        "name": name,
+        "silent_us": silent_us,
+        "name": folder.resolve().name,
         "grasps": manifest.classes,
         "switches": [switch.name for switch in manifest.switches],
         "joints": [joint.name for joint in manifest.joints],
         "empty_hand": manifest.knows_none,
+        "hand": load_hand(folder, manifest),
     }
-    return message(topic, known, **{"preshapes": False} | shows)
+    return message(topic, known, **shows)
 
 
 class FrameText:
-    """Makes the text of a moment of a run of `build`: the fields of its grasp, preshape and angles as in sinks, and
+    """Makes the text of a moment of a run of `build`: the fields of its grasp as in sinks, and
 
+    change         as timelines show it, with times since 1970
     late_us        its age now
+    preshape       the name of what the robot's hand should do now, or None
     closed         a character per kept switch, in the build's order: "1" closed, "0" open
     joints         the value of each joint of the build, in its unit; None while they are lost
     probabilities  of every class of the build, in order; None while too little can be read
@@ -181,14 +206,14 @@ class FrameText:
         calibration = calibration_of(harness.taxel_settings)
         self._taxels = [None if calibration is None else calibration.line(name) for name in harness.taxel_names]
 
-    def __call__(self, moment: Moment) -> bytes:
-        """Return the text."""
+    def __call__(self, moment: Moment, clock_us: int) -> bytes:
+        """Return the text of a moment whose clock began at `clock_us`."""
         frame, codes, shut = moment.switches, moment.codes, ""
         if self._switches:
             shut = f"{0 if frame is None else frame.closed:0{self._switches}b}"[::-1]
         more = {
-            "preshape": moment.preshape,
-            "angles": moment.angles,
+            "preshape": moment.preshape and moment.preshape.name,
+            "change": change_of(moment.grasp, clock_us),
             "late_us": now_us() - moment.grasp.time_us,
             "closed": shut,
             "joints": None

@@ -13,13 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from threading import Event, Thread
 
-from msgspec.structs import replace
-
 from thenar.drivers.closing import Closing
 from thenar.drivers.errors import SettingError, ThenarError
 
 from ..build import Build
-from ..hand import load_hand
 from ..harness.loading import parse_harness
 from ..harness.wiring import Harness
 from ..live.recogniser import Moment
@@ -27,7 +24,7 @@ from ..live.replay import Stepper, periods_us
 from ..published import LiveGrasp
 from ..recording.reader import Entry, Reader
 from ..recording.session import Label, Session
-from .live import Change, FrameText, build_message, change_of
+from .live import FrameText, Past, build_message, change_of, silent_us
 from .server import message
 
 # The interval of moments that are kept; the most changes of a build, or labels, that the overview holds.
@@ -59,7 +56,7 @@ class Replay(Closing):
     manifest : Manifest
         That of the first build.
     about : bytes
-        The message "replay": what `build_message` says of the first build, the names of all, and the hand.
+        The message "replay": what `build_message` says of the first build, and the names of recording and builds.
 
     Raises
     ------
@@ -81,13 +78,12 @@ class Replay(Closing):
         names = [build.resolve().name for build in builds]
         if len(set(names)) < len(names):
             names = [str(build) for build in builds]
-        hand = load_hand(builds[0], manifest)
-        self.about = build_message("replay", manifest, path.name, builds=names, hand=hand)
+        self.about = build_message("replay", builds[0], manifest, silent_us=None, name=path.name, builds=names)
         # What was read so far: its span; by build the changes; the labels; of each kept moment its time and where its
         # text ends.
         self._first_us: int | None = None
         self._last_us = 0
-        self._changes: list[list[Change]] = [[] for _ in builds]
+        self._pasts = [Past() for _ in builds]
         self._truth = list[Truth]()
         self._begun_us: int | None = None
         self._times, self._ends = array("q"), array("q", (0,))
@@ -127,7 +123,7 @@ class Replay(Closing):
 
     def _overview(self, have: Sequence[int]) -> bytes:
         scanned = self._scanned.is_set()
-        lists: tuple[Sequence[object], ...] = (*self._changes, self._truth)
+        lists: list[Sequence[object]] = [*(past.changes for past in self._pasts), self._truth]
         *changes, truth = [found[max(n, 0) : max(n, 0) + MOST_ENTRIES] for n, found in zip(have, lists, strict=True)]
         return message(
             "overview",
@@ -164,54 +160,52 @@ class Replay(Closing):
         path, newest = self._reader.path, None
         try:
             periods = periods_us(islice(Reader(path), _PERIODS_OF))
+            for past in self._pasts:
+                past.silent_us = silent_us(*periods)
             steppers = [Stepper(build, path.name, periods) for build in self._builds]
             for entry in self._reader:
                 if self._stop.is_set():
                     return
                 newest = self._take(entry, [stepper.take(entry) for stepper in steppers]) or newest
-            if newest is not None and newest.grasp.time_us > self._times[-1]:
+            if newest is not None and self._clock_us + newest.grasp.time_us > self._times[-1]:
                 self._keep(newest)
         except ThenarError as wrong:
             self._faults.append(str(wrong))
         except OSError as wrong:
             self._faults.append(f"{path.name} is shown up to here: {wrong.strerror}")
         self._faults += [fault.message for fault in self._reader.faults()]
-        if max(len(self._truth), *map(len, self._changes)) == _MOST_CHANGES:
+        if max(len(self._truth), *(len(past.changes) for past in self._pasts)) >= _MOST_CHANGES:
             self._faults.append(f"the timeline ends at {_MOST_CHANGES} changes of the prediction, or labels")
         self._scanned.set()
 
+    @property
+    def _clock_us(self) -> int:
+        """When the clock of the session began, since 1970."""
+        return self._reader.session.clock_ns // 1000
+
     def _take(self, entry: Entry, moments: Sequence[Moment | None]) -> Moment | None:
-        """Take an entry and what each build makes of it; return the first one's moment, with times since 1970."""
-        session = self._reader.session
-        clock_us = session.clock_ns // 1000
+        """Take an entry and what each build makes of it; return the first one's moment."""
         if isinstance(entry, Session):
             self._begun_us = None
             return None
-        unix_us = clock_us + entry.time_us
+        unix_us = self._clock_us + entry.time_us
         self._first_us = unix_us if self._first_us is None else self._first_us
         self._last_us = max(self._last_us, unix_us)
         if isinstance(entry, Label):
             self._label(unix_us, entry)
-        changed = [
-            moment is not None and self._change(build, changes, entry, moment)
-            for build, moment, changes in zip(self._builds, moments, self._changes, strict=True)
-        ]
+        changed = False
+        for build, moment, past in zip(self._builds, moments, self._pasts, strict=True):
+            if moment is None:
+                continue
+            # For a run of the same build, its own predictions are shown.
+            if isinstance(entry, LiveGrasp) and self._reader.session.build == build.manifest.checksum:
+                moment.grasp = entry
+            if len(past.changes) < _MOST_CHANGES and past.take(change_of(moment.grasp, self._clock_us)):
+                changed |= moment is moments[0]
         moment = moments[0]
-        if moment is not None and (not self._times or changed[0] or unix_us >= self._times[-1] + _SAMPLE_US):
+        if moment is not None and (not self._times or changed or unix_us >= self._times[-1] + _SAMPLE_US):
             self._keep(moment)
         return moment
-
-    def _change(self, build: Build, changes: list[Change], entry: Entry, moment: Moment) -> bool:
-        """Date a build's moment, and return whether it differs from the last on timelines."""
-        session = self._reader.session
-        own = session.build == build.manifest.checksum
-        moment.grasp = _dated(entry if own and isinstance(entry, LiveGrasp) else moment.grasp, session.clock_ns // 1000)
-        change, last = change_of(moment.grasp), changes[-1] if changes else None
-        # Clocks of two sessions may overlap.
-        changed = last is None or (change[1:] != last[1:] and change[0] >= last[0])
-        if changed and len(changes) < _MOST_CHANGES:
-            changes.append(change)
-        return changed
 
     def _label(self, unix_us: int, label: Label) -> None:
         if label.event == "begun" or self._begun_us is None:
@@ -224,17 +218,11 @@ class Replay(Closing):
 
     def _keep(self, moment: Moment) -> None:
         """Keep the message of a moment. The server's thread reads it once its time is in the list."""
-        text = self._text(moment)
+        text = self._text(moment, self._clock_us)
         self._kept.write(text)
         self._ends.append(self._ends[-1] + len(text))
-        self._times.append(moment.grasp.time_us)
+        self._times.append(self._clock_us + moment.grasp.time_us)
 
 
 def _is_number(given: object) -> bool:
     return isinstance(given, int) and not isinstance(given, bool) and abs(given) < _LARGEST
-
-
-def _dated(grasp: LiveGrasp, clock_us: int) -> LiveGrasp:
-    """Return a grasp with times since 1970 instead of its session's clock."""
-    began_us = None if grasp.segment_us is None else grasp.segment_us + clock_us
-    return replace(grasp, time_us=grasp.time_us + clock_us, segment_us=began_us)

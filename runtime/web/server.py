@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
-from typing import TypeVar
 from urllib.parse import quote
 
 import msgspec
@@ -27,7 +26,6 @@ from ..sinks.sockets import listen
 from .guard import HEADERS, Guard
 
 Message = bytes | Callable[[], bytes]
-_Made = TypeVar("_Made", bytes, Message)
 
 _log = logging.getLogger("thenar")
 # Neither of them writes a stranger's input into our log.
@@ -38,7 +36,6 @@ PAGES = Path(__file__).parent / "pages"
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 PERIOD_S = 1 / 30
-_MOST_TOPICS = 64
 # Pages open at the same time, and connections, some of which fetch files.
 MOST_PAGES, MOST_CONNECTIONS = 32, 96
 # Time limit of a connection that is not a page.
@@ -168,23 +165,17 @@ class Server(Closing):
             self._respond, access_log=None, logger=_quiet, keepalive_timeout=_FETCH_S, lingering_time=0
         )
         with self._listener:
-            working = [asyncio.create_task(self._accept_clients()), asyncio.create_task(self._tick())]
-            self._started.set()
             try:
-                closing = asyncio.create_task(self._closing.wait())
-                await asyncio.wait((closing, *working), return_when=asyncio.FIRST_COMPLETED)
-                for done in working:
-                    if done.done():
-                        done.result()
+                async with asyncio.TaskGroup() as group:
+                    working = [group.create_task(self._accept_clients()), group.create_task(self._tick())]
+                    self._started.set()
+                    await self._closing.wait()
+                    for task in working:
+                        task.cancel()
             finally:
-                for task in (closing, *working):
-                    task.cancel()
-                await asyncio.gather(*working, return_exceptions=True)
                 # The last message that a page shows is how it ended.
-                last = {topic: _text(made) for topic, made in self._latest.copy().items()}
                 for page in tuple(self._pages):
-                    for text in page.its(last).values():
-                        await page.say(text)
+                    await page.show(self._latest.copy())
                 await asyncio.gather(*(page.close(WSCloseCode.GOING_AWAY) for page in self._pages))
                 await self._server.shutdown(_CLOSING_S)
 
@@ -265,9 +256,8 @@ class Server(Closing):
         live.headers.update(HEADERS)
         await live.prepare(request)
         topics = request.query.get("topics")
-        page = _Page(live, transport, self._loop.time(), frozenset(topics.split(",", _MOST_TOPICS)) if topics else None)
-        for made in page.its(self._latest.copy()).values():
-            await page.say(_text(made))
+        page = _Page(live, transport, self._loop.time(), frozenset(topics.split(",")) if topics else None)
+        await page.show(self._latest.copy())
         self._pages.append(page)
         self._somebody.set()
         try:
@@ -324,13 +314,15 @@ class _Page:
         self._waiting: dict[str, bytes] = {}
         self._may, self._spoke_s = MOST_AT_ONCE, now_s
 
-    def its(self, messages: Mapping[str, _Made]) -> dict[str, _Made]:
-        """Return those of its topics."""
-        return {topic: made for topic, made in messages.items() if self._topics is None or topic in self._topics}
+    async def show(self, latest: Mapping[str, Message]) -> None:
+        """Send the newest message of each topic."""
+        for topic, made in latest.items():
+            if self._topics is None or topic in self._topics:
+                await self.say(_text(made))
 
     async def send(self, new: Mapping[str, bytes]) -> None:
         """Send the newest of each topic, unless the page is behind; one that hangs does not reply to a ping."""
-        self._waiting.update(self.its(new))
+        self._waiting |= {topic: text for topic, text in new.items() if self._topics is None or topic in self._topics}
         if self.transport.get_write_buffer_size():
             return
         waiting, self._waiting = self._waiting, {}

@@ -231,8 +231,6 @@ function chain(base, ahead, flex, lengths, bends) {
   return points;
 }
 
-const rounded = (text) => text.replace(/-?\d+\.\d+(e-?\d+)?/g, (number) => Number(number).toFixed(1));
-
 function posedHand(joints) {
   const [forearm, palm] = [draw("path", { class: "flesh" }), draw("path", { class: "flesh" })];
   const digits = Object.entries(DIGITS).map(([digit, { width }]) => {
@@ -251,13 +249,14 @@ function posedHand(joints) {
     joints.forEach((joint, at) => {
       if (own[at] !== null) (angles[joint.digit] ??= {})[joint.moves] = degrees(joint, own[at]);
     });
-    const pose = posed(angles), line = (points, closed) => rounded(path(points, closed));
+    const pose = posed(angles), line = (points, closed) => path(points.map((point) => point.map((value) => value.toFixed(1))), closed);
     forearm.setAttribute("d", line(pose.forearm, false));
     palm.setAttribute("d", line(pose.palm, true));
     // A part of the hand is marked while one of its joints is lost.
     const lost = new Set(joints.filter((_, at) => own[at] === null).map(({ digit }) => digit));
     for (const { digit, parts, group } of digits) {
-      for (const part of parts) part.setAttribute("d", line(pose.chains[digit], false));
+      const d = line(pose.chains[digit], false);
+      for (const part of parts) part.setAttribute("d", d);
       group.classList.toggle("gone", lost.has(digit));
     }
     palm.classList.toggle("gone", lost.has("palm") || lost.has("wrist"));

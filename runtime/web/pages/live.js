@@ -15,9 +15,11 @@ const timeline = new Timeline($("timeline"), {
 const replay = new Replay(view, timeline, (what, numbers) => ask(what, { numbers, ids }));
 const run = {
   build: begin,
-  hand: (hand) => view.setHand(hand),
-  past: ({ changes, until_us }) => timeline.past(changes, until_us),
-  frame,
+  past: ({ changes, until_us }) => timeline.follow(changes, until_us),
+  frame: (frame) => {
+    timeline.follow([frame.change], frame.change[0]);
+    view.take(frame);
+  },
   health: (report) => view.health(report),
 };
 let build = null;
@@ -25,17 +27,16 @@ let studio = null; // its controls
 
 const ask = openPage({
   open: () => {
-    view.state.link(true);
+    view.link(true);
     if (ids.length) ask("replay", { ids });
   },
-  closed: () => view.state.link(false),
+  closed: () => view.link(false),
   ...(ids.length ? {} : run),
   replay: (recording) => {
     for (const one of document.querySelectorAll("[data-of]")) one.hidden = one.dataset.of !== "recording";
     $("other").hidden = recording.builds.length < 2;
-    begin(recording, false);
-    view.setHand(recording.hand);
-    replay.begin(recording);
+    begin(recording);
+    replay.begin();
   },
   overview: (overview) => replay.overview(overview),
   moments: (moments) => replay.moments(moments),
@@ -44,20 +45,12 @@ const ask = openPage({
   station: (station) => steer((page) => page.station(station)),
 });
 
-function begin(about, live = true) {
-  if (live && build !== null && build !== about.name) view.tell(`The run goes on with ${about.name}, before it was ${build}.`);
+function begin(about) {
+  if (build !== null && build !== about.name) view.tell(`The run goes on with ${about.name}, before it was ${build}.`);
   build = about.name;
   for (const section of document.querySelectorAll("section.data")) section.hidden = false;
-  timeline.types(about.grasps);
-  view.build(about, live);
-}
-
-function frame(message) {
-  const { time_us, grasp, health, state, segment_type, segment_us } = message;
-  const began = state === "held" || state === "releasing" ? segment_us : null;
-  const trouble = health === "degraded" || health === "unknown" ? health : "";
-  timeline.follow([time_us, grasp, trouble, began === null ? "" : segment_type, began], message.unix_us);
-  view.take(message);
+  timeline.begin(about);
+  view.begin(about);
 }
 
 // The studio has a file for its controls.

@@ -1,5 +1,5 @@
 // A recording on its page: this page's position in it, which plays here, and what it asks the server for.
-import { differs, spanAt, Track } from "./timeline.js";
+import { differs, spanAt } from "./timeline.js";
 import { $, say } from "./wire.js";
 
 const ASK_MS = 80, LATER_MS = 500; // the server takes 20 requests a second
@@ -28,11 +28,9 @@ export class Replay {
   }
 
   /** Begin, or begin again after the server came back: the position stays. */
-  begin({ builds }) {
-    this.#timeline.live = false;
-    this.#timeline.tracks = builds.map((name) => new Track(builds.length > 1 ? name : ""));
+  begin() {
     this.#labels.clear();
-    this.#counts = [...builds, ""].map(() => 0);
+    this.#counts = [...this.#timeline.tracks, this.#labels].map(() => 0);
     this.#asking = false;
     this.#ask("overview", this.#counts);
     this.moved();
@@ -116,7 +114,7 @@ export class Replay {
   #show() {
     const { at, truth, tracks } = this.#timeline;
     if (at === null || !this.#covers(at) || !this.#moments.frames.length) return;
-    const frame = this.#moments.frames.findLast(({ time_us }) => time_us <= at) ?? this.#moments.frames[0];
+    const frame = this.#moments.frames.findLast(({ change: [us] }) => us <= at) ?? this.#moments.frames[0];
     const label = spanAt(truth, at)?.name ?? null, [, other] = tracks;
     this.#view.take(frame);
     const bad = label !== null && differs(frame.grasp, label);

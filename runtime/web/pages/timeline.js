@@ -1,16 +1,16 @@
 // One axis of time for runs and recordings: lanes of spans on a canvas, a cursor, zoom, and keys. All times are in
-// microseconds.
+// microseconds since 1970.
 import { typeStyles } from "./types.js";
-import { $, clearedPen, colours, redraw, say } from "./wire.js";
+import { $, clearedPen, colours, paced, redraw, say, WORDS_MS } from "./wire.js";
 
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
-const FOLLOW_MS = 100; // while it follows now, the lanes move ten times a second, and words change so often
+const FOLLOW_MS = 100; // the lanes of a run move ten times a second at most
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
-export class Track {
+class Track {
   constructor(name = "") {
     this.name = name;
     this.announced = [];
@@ -78,7 +78,7 @@ function errors(truth, announced) {
 }
 
 /** Return a duration as "1:02.3". */
-export function clock(seconds, digits = 1) {
+function clock(seconds, digits = 1) {
   const whole = Math.max(seconds, 0), hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
   const rest = (whole % 60).toFixed(digits).padStart(digits ? 3 + digits : 2, "0");
   return `${hours ? `${hours}:${String(minutes).padStart(2, "0")}` : minutes}:${rest}`;
@@ -91,20 +91,20 @@ export class Timeline {
   first = null;
   last = null;
   at = null; // the cursor; null follows now
-  dated = 0; // what makes time of day of a time of a run
+  #silent = Infinity; // how long a moment of a run is current
   #from = 0;
   #span = USUAL_US;
   #wide = 0;
   #whole = false; // while a recording is read, the window has all of it, until somebody zooms
   #styles = typeStyles([]);
-  #colours = null; // of the page
+  #colours = null; // of the page, as long as they and the canvas are the same
+  #pen = null;
   #pointers = new Map();
   #moved = 0;
-  #drawing = false;
   #stale = true; // the lanes, and not just the cursor
-  #drawn = 0;
-  #saying = null;
-  #said = 0;
+  #paint = paced(() => this.#draw());
+  #follow = paced(() => this.#draw(), FOLLOW_MS);
+  #say = paced(() => this.#read(), WORDS_MS);
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
   constructor(canvas, on) {
@@ -119,51 +119,43 @@ export class Timeline {
     for (const kind of ["down", "move", "up", "cancel"]) {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
-    redraw(canvas, () => this.draw());
+    redraw(canvas, () => {
+      [this.#pen, this.#wide, this.#colours] = [clearedPen(canvas), canvas.clientWidth, colours()];
+      this.#stale = true;
+      this.#draw(); // at once: it is cleared
+    });
     const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
     for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
     addEventListener("keydown", (event) => this.#key(event));
   }
 
-  /** Take the names of the types, which have colours. */
-  types(names) {
-    this.#styles = typeStyles([...names, "none", "unknown"]);
+  /** Take what is known of the build of a run, or of those of a recording. */
+  begin({ grasps, builds, silent_us }) {
+    this.#styles = typeStyles([...grasps, "none", "unknown"]);
+    [this.live, this.#silent] = [silent_us !== null, silent_us];
+    if (!this.live) this.tracks = builds.map((name) => new Track(builds.length > 1 ? name : ""));
   }
 
-  /** Take a moment of a run. */
-  follow(change, unixUs) {
-    const [time] = change, track = this.#runUntil(time), silent = time - track.untilUs > 1_000_000;
-    if (track.untilUs !== null && time < track.untilUs) return; // changes that were sent before passed it
-    if (track.untilUs !== null && silent) track.end();
-    track.take(change);
+  /** Take changes of a run, of which some may be known already, and the time until which they are all. */
+  follow(changes, until) {
+    if (!changes.length) return;
+    // A clock that goes back is another host's.
+    if (this.tracks[0].untilUs - until > 1_000_000) [this.tracks, this.first, this.at] = [[new Track()], null, null];
+    const [track] = this.tracks, known = track.untilUs ?? -1;
+    if (until < known) return; // changes that were sent before passed it
+    if (known >= 0 && changes[0][0] - known > this.#silent) track.end();
+    for (const change of changes) if (change[0] > known) track.take(change);
+    track.untilUs = until;
     for (const lane of [track.announced, track.segments, track.health]) {
-      const gone = lane.findIndex((span, at) => span.to > time - KEPT_US && at >= lane.length - MOST_SPANS);
+      const gone = lane.findIndex((span, at) => span.to > until - KEPT_US && at >= lane.length - MOST_SPANS);
       if (gone > 0) lane.splice(0, gone);
     }
-    this.dated = unixUs - time;
-    this.first = Math.max(this.first ?? time, time - KEPT_US);
-    this.last = time;
-    if (this.at === null) this.#from = time - this.#span;
-    this.draw();
-  }
-
-  /** Take the past of a run, of which the page may know more, or a part, already. */
-  past(changes, until) {
-    const track = this.#runUntil(until), known = track.untilUs ?? -1, news = changes.filter(([time]) => time > known);
-    if (!news.length) return;
-    if (known >= 0) track.end();
-    for (const change of news) track.take(change);
-    track.untilUs = until;
-    this.first ??= news[0][0];
-  }
-
-  // The track of the run. A clock that goes back is another host's.
-  #runUntil(time) {
-    if (this.tracks[0].untilUs - time > 1_000_000) {
-      this.tracks = [new Track()];
-      this.first = this.at = null;
-    }
-    return this.tracks[0];
+    this.first = Math.max(this.first ?? changes[0][0], until - KEPT_US);
+    this.last = until;
+    if (this.at === null) this.#from = until - this.#span;
+    this.#stale = true;
+    this.#follow();
+    this.#say();
   }
 
   /** Take the span of a recording and where its predictions differ from the labels. */
@@ -192,7 +184,7 @@ export class Timeline {
   get reading() {
     if (this.last === null) return this.live ? "no frame yet" : "not read yet";
     const at = this.at ?? this.last, parts = [];
-    if (this.live) parts.push(this.at === null ? "now" : `${clock((this.last - at) / 1e6)} ago`, time(at + this.dated));
+    if (this.live) parts.push(this.at === null ? "now" : `${clock((this.last - at) / 1e6)} ago`, time(at));
     else parts.push(`${clock((at - this.first) / 1e6, 2)} of ${clock((this.last - this.first) / 1e6)}`, time(at));
     const truth = spanAt(this.truth, at);
     if (truth) parts.push(`truth ${truth.name}`);
@@ -217,32 +209,27 @@ export class Timeline {
     return [...lanes, [`segments${of}`, ["type", segments]], [`health${of}, where it is not ok`, ["trouble", health]]];
   }
 
-  /** Draw soon; while it follows now, ten times a second. */
+  /** Draw soon: the lanes, or just the cursor. */
   draw(stale = true) {
     this.#stale ||= stale;
-    if (this.#drawing) return;
-    this.#drawing = true;
-    const wait = this.live && this.at === null ? FOLLOW_MS - (performance.now() - this.#drawn) : 0;
-    setTimeout(() => requestAnimationFrame(() => this.#paint()), Math.max(wait, 0));
-  }
-
-  #paint() {
-    [this.#drawing, this.#drawn] = [false, performance.now()];
-    const cursor = $("cursor"), share = this.at === null ? -1 : (this.at - this.#from) / this.#span;
-    if (this.#stale) this.#draw();
-    this.#stale = false;
-    cursor.hidden = share < 0 || share > 1;
-    cursor.style.transform = `translateX(${(share * this.#wide).toFixed(1)}px)`;
-    this.#saying ??= setTimeout(() => this.#say(), Math.max(FOLLOW_MS - (performance.now() - this.#said), 0));
+    this.#paint();
+    this.#say();
   }
 
   #draw() {
-    const { canvas } = this, lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, wide = canvas.clientWidth;
-    this.#wide = wide;
-    if (canvas.style.height !== `${high}px`) canvas.style.height = `${high}px`;
+    const cursor = $("cursor"), share = this.at === null ? -1 : (this.at - this.#from) / this.#span;
+    if (this.#stale) this.#drawLanes();
+    this.#stale = false;
+    cursor.hidden = share < 0 || share > 1;
+    cursor.style.transform = `translateX(${(share * this.#wide).toFixed(1)}px)`;
+  }
+
+  #drawLanes() {
+    const lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, pen = this.#pen, wide = this.#wide;
+    if (this.canvas.style.height !== `${high}px`) this.canvas.style.height = `${high}px`;
     if (!wide) return;
-    const pen = clearedPen(canvas), x = (us) => ((us - this.#from) / this.#span) * wide;
-    this.#colours = colours();
+    const x = (us) => ((us - this.#from) / this.#span) * wide;
+    pen.clearRect(0, 0, wide, high);
     pen.font = `${LETTERS}px system-ui, sans-serif`;
     pen.textBaseline = "middle";
     lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));
@@ -277,14 +264,15 @@ export class Timeline {
       pen.strokeStyle = line;
       pen.strokeRect(left + 0.5, top + 0.5, Math.max(wide - 1, 0), BAR - 1);
     }
+    if (kind === "early" || wide < LETTERS) return;
     const text = [name, code].map((one) => sign + one).find((one) => pen.measureText(one).width + 6 <= wide);
     pen.fillStyle = kind !== "type" ? page : ink ?? letters;
-    if (text && kind !== "early") pen.fillText(text, left + 3, top + BAR / 2 + 1);
+    if (text) pen.fillText(text, left + 3, top + BAR / 2 + 1);
   }
 
   #axis(pen, x, wide, high) {
     const least = (this.#span / 1e6 / wide) * TICK, step = STEPS.find((one) => one >= least) ?? 86_400;
-    const base = this.live ? -this.dated : this.first ?? 0, digits = step < 0.1 ? 2 : step < 1 ? 1 : 0;
+    const base = this.live ? 0 : this.first ?? 0, digits = step < 0.1 ? 2 : step < 1 ? 1 : 0;
     pen.fillStyle = this.#colours.soft;
     for (let tick = Math.ceil((this.#from - base) / 1e6 / step) * step; base + tick * 1e6 <= this.#from + this.#span; tick += step) {
       const left = x(base + tick * 1e6), text = this.live ? time(tick * 1e6) : clock(tick, digits);
@@ -294,8 +282,7 @@ export class Timeline {
     }
   }
 
-  #say() {
-    [this.#saying, this.#said] = [null, performance.now()];
+  #read() {
     const { canvas, reading, last, first } = this, moved = this.at !== null || !this.live;
     say($("place"), reading);
     $("now").hidden = !this.live || this.at === null;

@@ -1,13 +1,12 @@
 // The view of a run or a recording on their page.
 import { drawHand } from "./hand.js";
 import { chip, typeStyles } from "./types.js";
-import { $, clock, fillTable, list, make, say, tell } from "./wire.js";
+import { $, clock, fillTable, list, make, paced, say, tell, WORDS_MS } from "./wire.js";
 
-const WORDS_MS = 200; // numbers and words change five times a second, so that they can be read
 const SETTLED_MS = 1000; // a text must be stable this long before it is read out
 const QUIET_MS = 3000; // minimum time between two texts
 const SHOWN = 8;
-const LEAST_MS = 500, PERIODS = 3, INTERVALS = 9, LOOK_MS = 100;
+const LOOK_MS = 100;
 
 // Of each health: its colour and sign, and what it means.
 const HEALTHS = {
@@ -18,25 +17,31 @@ const HEALTHS = {
   "no data": ["bad", ""],
 };
 
+/** Shows moments. Old data, and all data while the link is down, is greyed, and #age says why. */
 export class View {
+  #link = null; // whether there is one; null before the first
+  #readAt = null; // when the newest data was read
+  #silent = Infinity; // how long a moment is current, in milliseconds: moments of a recording have no age
+  #old = false;
+  #draw = paced(() => this.frame && this.#show());
+  #say = paced(() => this.frame && this.#words(), WORDS_MS);
+
   constructor() {
-    this.state = new State((old) => this.#aged(old));
     this.frame = null;
-    this.shown = null;
-    this.drawing = null;
     this.rows = new Map();
     this.quarantined = [];
-    this.words = 0;
-    this.later = null;
-    this.drawn = true; // what came last
     this.said = { text: "", at: 0, since: 0, candidate: "" };
+    setInterval(() => this.#look(), LOOK_MS);
   }
 
-  /** Take the grasp types, switches and joints of the build, and whether its moments are those of a run. */
-  build(build, live) {
-    this.state.live = live;
+  /** Take the grasp types, switches, joints and hand of the build, and how long a moment of its run is current. */
+  begin(build) {
+    this.frame = null; // what comes next is drawn, even if it is the same
+    this.#silent = (build.silent_us ?? Infinity) / 1000;
     this.switches = build.switches;
     this.joints = build.joints;
+    this.taxels = build.hand.taxels;
+    this.drawing = drawHand($("hand"), build.hand);
     const styles = typeStyles(build.grasps);
     this.rows = new Map(build.grasps.map((grasp) => {
       const full = make("span"), share = make("span", { class: "share" }), bar = make("div", { class: "bar" }, full);
@@ -48,19 +53,22 @@ export class View {
     $("empty-hand").hidden = build.empty_hand;
   }
 
-  /** Take the positions of the build's inputs on the hand. */
-  setHand(hand) {
-    this.hand = hand;
-    this.drawing = drawHand($("hand"), hand, {});
+  /** Take the state of the connection to the server. */
+  link(up) {
+    this.#link = up;
+    this.#look();
   }
 
   /** Take a moment. */
   take(frame) {
+    if (frame === this.frame) return;
+    const news = frame.grasp !== this.frame?.grasp;
     this.frame = frame;
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
-    const age = ages.length ? Math.min(...ages) : null;
-    if (this.state.live && age !== null) this.state.data(frame.time_us - age, age + (frame.late_us ?? 0));
-    this.#later();
+    if (ages.length && this.#silent < Infinity) this.#readAt = performance.now() - (Math.min(...ages) + frame.late_us) / 1000;
+    this.#look();
+    this.#draw();
+    this.#say(news);
   }
 
   /** Take the health of devices and inputs. */
@@ -83,55 +91,49 @@ export class View {
     say($("spoken"), words);
   }
 
-  #aged(old) {
-    this.shown = null; // everything is drawn again
-    this.#later();
+  #look() {
+    const age = this.#readAt === null ? 0 : performance.now() - this.#readAt, silent = age > this.#silent;
+    const since = this.#readAt === null ? " yet" : ` since ${clock(this.#readAt)}`, old = !this.#link || silent;
+    say($("age"), this.#link === false ? `no data${since}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "");
+    if (old === this.#old) return;
+    this.#old = old;
+    document.documentElement.classList.toggle("old", old);
     this.#title();
+    this.#draw();
     if (old) this.#announce("no data", performance.now(), true);
   }
 
   #title() {
-    const words = this.state.old ? "no data" : this.frame?.grasp;
+    const words = this.#old ? "no data" : this.frame?.grasp;
     document.title = words ? `${words} · thenar` : "thenar";
   }
 
-  #later() {
-    if (this.drawn) requestAnimationFrame(() => this.#draw());
-    this.drawn = false;
-  }
-
-  #draw() {
-    this.drawn = true;
-    const { frame } = this, now = performance.now();
-    if (frame === null || frame === this.shown) return;
-    const news = this.shown?.grasp !== frame.grasp;
-    this.shown = frame;
-    this.#now(frame);
-    this.#hand(frame);
-    const wait = news ? 0 : WORDS_MS - (now - this.words);
-    if (wait <= 0) this.#numbers(frame);
-    else this.later ??= setTimeout(() => this.#numbers(this.frame), wait);
-    this.#announce(this.state.old ? "no data" : frame.grasp, now);
-  }
-
-  #now(frame) {
-    const grasp = $("grasp");
+  #show() {
+    const { frame } = this, grasp = $("grasp"), [closed, gone] = this.#closed();
     if (grasp.textContent !== frame.grasp) {
       grasp.textContent = frame.grasp;
       grasp.style.setProperty("--letters", String([...frame.grasp].length));
       this.#title();
     }
     grasp.classList.toggle("unsure", frame.grasp === "unknown");
-    const health = this.state.old ? "no data" : frame.health, [is, means] = HEALTHS[health] ?? ["bad", ""];
+    const health = this.#old ? "no data" : frame.health, [is, means] = HEALTHS[health];
     $("health").dataset.is = is;
     tell("health", health);
     say($("why"), means);
+    this.drawing.setClosed(closed, gone);
+    this.drawing.setPose((frame.joints ?? []).map((value, at) => (frame.lost.includes(this.joints[at]) ? null : value)));
+    this.drawing.setTaxels(this.taxels.map(({ name }) => frame.taxels[name] ?? null));
+    this.#announce(this.#old ? "no data" : frame.grasp, performance.now());
   }
 
-  #hand(frame) {
-    if (!this.drawing) return;
-    const lost = new Set(frame.lost), gone = this.switches.map((name) => lost.has(name));
-    const closed = gone.map((missing, bit) => !missing && frame.closed[bit] === "1");
+  // Which switches are lost, and which of the others are closed.
+  #closed() {
+    const { closed, lost } = this.frame, gone = this.switches.map((name) => lost.includes(name));
+    return [gone.map((missing, bit) => !missing && closed[bit] === "1"), gone];
+  }
+
+  #words() {
+    const { frame } = this, [closed, gone] = this.#closed();
     if (this.switches.length) {
       const names = this.switches.filter((_, bit) => closed[bit]);
       const more = names.length > SHOWN ? ` and ${names.length - SHOWN} more` : "";
@@ -140,15 +142,6 @@ export class View {
       const said = `${names.length} of ${counted}`;
       say($("hand-says"), `${said}${names.length ? ": " : ""}${names.slice(0, SHOWN).join(", ")}${more}`);
     }
-    this.drawing.setClosed(closed, gone);
-    this.drawing.setPose((frame.joints ?? this.joints.map(() => null)).map((value, at) => (lost.has(this.joints[at]) ? null : value)));
-    this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
-  }
-
-  #numbers(frame) {
-    clearTimeout(this.later);
-    this.later = null;
-    this.words = performance.now();
     for (const [at, [grasp, { row, full, share }]] of [...this.rows].entries()) {
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
       full.style.transform = `scaleX(${value ?? 0})`;
@@ -159,7 +152,7 @@ export class View {
     const sure = frame.grasp === "unknown" ? "" : `${(100 * frame.probability).toFixed(0)}\u00a0% in this frame`;
     const held = frame.segment_us === null ? "" : `segment ${frame.segment}, ${frame.state} for ${((frame.time_us - frame.segment_us) / 1e6).toFixed(1)}\u00a0s`;
     say($("segment"), [sure, held].filter(Boolean).join(" · "));
-    if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape?.name ?? "none yet"}`);
+    if (!$("preshape").hidden) say($("preshape"), `Preshape: ${frame.preshape ?? "none yet"}`);
     for (const id of ["latency", "switch_age", "glove_age"]) {
       const us = frame[`${id}_us`] ?? null;
       say($(id), us === null ? "none yet" : `${(us / 1000).toFixed(1)} ms`);
@@ -183,58 +176,5 @@ export class View {
       Object.assign(said, { text: grasp, at: now });
       say($("spoken"), grasp);
     }
-  }
-}
-
-/**
- * Watches the age of the data, and says it in #age.
- *
- * Data is old after half a second, or after three periods of its source if these are longer. Old data, and all data while
- * the link is down, is greyed: the root element has the class "old".
- */
-class State {
-  #readAt = null;
-  #dataUs = null;
-  #intervals = [];
-  #link = null;
-
-  /** @param {function(boolean): void} changed called with whether the data is old, when that changes */
-  constructor(changed = () => {}) {
-    this.changed = changed;
-    this.live = true; // moments of a recording have no age
-    this.old = false;
-    setInterval(() => this.#look(), LOOK_MS);
-  }
-
-  /**
-   * Take the moment at which the newest data was read, on any clock, and its age now, both in microseconds; null: none
-   * was read yet.
-   */
-  data(timeUs, ageUs) {
-    if (timeUs === null) return;
-    this.#readAt = performance.now() - ageUs / 1000;
-    if (this.#dataUs !== null && timeUs > this.#dataUs) this.#intervals.push((timeUs - this.#dataUs) / 1000);
-    if (this.#intervals.length > INTERVALS) this.#intervals.shift();
-    this.#dataUs = timeUs;
-    this.#look();
-  }
-
-  /** Take the state of the connection to the server. */
-  link(up) {
-    this.#link = up;
-    this.#look();
-  }
-
-  #look() {
-    const up = Boolean(this.#link), age = this.#readAt === null ? 0 : performance.now() - this.#readAt;
-    const middle = [...this.#intervals].sort((one, other) => one - other)[this.#intervals.length >> 1] ?? 0;
-    const silent = this.live && age > Math.max(LEAST_MS, PERIODS * middle), old = !up || silent;
-    const since = this.#readAt === null ? "" : ` since ${clock(this.#readAt)}`;
-    const words = this.#link === null ? "" : !up ? `no data${since || " yet"}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "";
-    say($("age"), words);
-    document.documentElement.classList.toggle("old", old);
-    if (old === this.old) return;
-    this.old = old;
-    this.changed(old);
   }
 }

@@ -109,6 +109,31 @@ export function fillMenu(menu, members, usual = "") {
   if (menu.parentElement.matches("label")) menu.parentElement.hidden = !members.length;
 }
 
+export const WORDS_MS = 200; // numbers and words change five times a second at most, so that they can be read
+
+/**
+ * Return the function that lets `paint` run in the next frame of the screen, but not again within `ms` milliseconds: of
+ * calls that come sooner, the last one counts. So all that comes at one time is painted in one frame.
+ * @returns {function(boolean=): void} `atOnce` is in the next frame in any case
+ */
+export function paced(paint, ms = 0) {
+  let asked = false, last = -Infinity, timer = null;
+  return function ask(atOnce = false) {
+    const now = performance.now();
+    if (asked) return;
+    clearTimeout(timer);
+    if (!atOnce && now - last < ms) {
+      timer = setTimeout(ask, ms);
+      return;
+    }
+    [asked, last] = [true, now];
+    requestAnimationFrame(() => {
+      asked = false;
+      paint();
+    });
+  };
+}
+
 /** Return the pen of a canvas, which is made as large as it is shown, and cleared: its unit is a pixel of the page. */
 export function clearedPen(canvas) {
   const pen = canvas.getContext("2d");

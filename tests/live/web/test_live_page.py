@@ -205,7 +205,8 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
         "switches": [image],
         "joints": [],
         "preshapes": True,
-        "records": True,
+        "silent_us": 500_000,
+        "hand": hand,
     }
     frame = {
         **{
@@ -218,8 +219,9 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
             "margin": 1,
         },
         **{"health": "degraded", "switch_age_us": 1, "glove_age_us": None, "latency_us": 1, "lost": [image]},
-        **{"state": "held", "segment": 1, "segment_type": SCRIPT, "segment_us": 0, "preshape": {"name": image}},
-        **{"closed": "1", "joints": [], "taxels": {}, "probabilities": [1.0, 0.0]},
+        **{"state": "held", "segment": 1, "segment_type": SCRIPT, "segment_us": 0, "preshape": image},
+        **{"closed": "1", "joints": [], "taxels": {}, "probabilities": [1.0, 0.0], "late_us": 0},
+        "change": [10**15, SCRIPT, "degraded", SCRIPT, 10**15 - 1_000_000],
     }
     report = {
         **{
@@ -232,7 +234,6 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
     with Server("live", "127.0.0.1:0", token=None) as server:
         server.publish("shell", message("shell", project=image, build=SCRIPT, rate=image, wearer=SCRIPT, pages=()))
         server.publish("build", message("build", build))
-        server.publish("hand", message("hand", hand))
         server.publish("frame", message("frame", frame))
         server.publish("health", message("health", report))
         browser.open(server.url)

@@ -286,6 +286,7 @@ def test_a_server_that_comes_back_finds_the_page_where_it_was(
         browser.wait(lambda: ticks(browser) != before)
         zoomed, shown, whole = ticks(browser), browser.text("grasp"), length(browser)
     browser.wait(lambda: browser.text("link").startswith("page: not connected"))
+    assert browser.axe() == []
     with served(path, stage.builds["both"], address=address):
         browser.wait(lambda: browser.text("link").startswith("page: connected"))
         browser.wait(lambda: browser.text("scanned") == "" and browser.text("rates"))

@@ -11,6 +11,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.keys import Keys
 
 from thenar.runtime.published import LiveGrasp
+from thenar.runtime.web.live import change_of
 from thenar.runtime.web.server import Server, message
 
 pytestmark = pytest.mark.slow
@@ -22,11 +23,18 @@ HAND = {
 }
 BUILD = {
     **{"name": "build", "grasps": ["Add", "PoS"], "switches": ["a", "b", "c"], "joints": []},
-    **{"preshapes": False, "empty_hand": True},
+    **{"preshapes": False, "empty_hand": True, "silent_us": 500_000, "hand": HAND},
 }
 SHELL = message("shell", project="bench", build="build 01234567", rate="", wearer="", pages=())
 GRASP = LiveGrasp(0, 0, 0, "Add", "Add", 0.95, 9, "ok", 2_000, None, 2_000)
 DETAIL = {"closed": "110", "joints": [], "taxels": {}, "probabilities": [0.95, 0.05], "late_us": 0}
+
+
+def told(grasp: LiveGrasp, **more: object) -> dict[str, object]:
+    """Return what a page is told of a moment, on a clock that began in 1970."""
+    return {**to_builtins(grasp), "change": change_of(grasp, 0), **(DETAIL | more)}
+
+
 _INK = "return getComputedStyle(document.getElementById(arguments[0])).color"
 
 
@@ -42,7 +50,7 @@ class Run:
         """Publish the next moment, 10 ms after the last one."""
         self._number += 1
         now = replace(grasp, time_us=10_000 * self._number, number=self._number)
-        self.server.publish("frame", message("frame", now, **(DETAIL | more)))
+        self.server.publish("frame", message("frame", told(now, **more)))
 
     def until(self, condition: Callable[[], object], **more: object) -> None:
         """Let the run go on until the page shows something."""
@@ -69,7 +77,6 @@ def page(browser: Any) -> Any:
             server = stack.enter_context(Server("live", "127.0.0.1:0", token=None))
             server.publish("shell", SHELL)
             server.publish("build", message("build", BUILD | build))
-            server.publish("hand", message("hand", HAND))
             return Run(server, browser)
 
         yield opened
@@ -107,17 +114,15 @@ def test_a_page_without_its_server_says_since_when_there_is_no_data(page: Callab
 
 
 def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run], browser: Any) -> None:
-    run = page()
+    run = page(silent_us=300_000_000)
     for number, age_s in enumerate((90, 90, 90, 290, 310)):
-        # The source has a period of 100 s.
         age_us = 1_000_000 * age_s
         now = replace(GRASP, time_us=100_000_000 * number + age_us, number=number, switch_age_us=age_us)
         closed = ("100", "110")[number % 2]
-        run.server.publish("frame", message("frame", now, **(DETAIL | {"closed": closed})))
+        run.server.publish("frame", message("frame", told(now, closed=closed)))
         said = f"{closed.count('1')} of 3 switches closed"
         browser.wait(lambda said=said: browser.text("hand-says").startswith(said))
-        # Before the second moment, the period is not known.
-        assert run.old == (number == 0 or age_s > 300)
+        assert run.old == (age_s > 300)
 
 
 def test_only_readable_switches_are_counted(page: Callable[..., Run], browser: Any) -> None:
@@ -173,9 +178,9 @@ def test_a_past_that_ends_a_little_after_the_moment_is_kept(page: Callable[..., 
     changes = [(10**6 * number, ("Add", "PoS")[number % 2], "", "Add", 10**6 * number) for number in range(1, 6)]
     run.server.publish("past", message("past", changes=changes, until_us=5_001_000))
     now = replace(GRASP, time_us=4_990_000, state="held", segment=4, segment_type="Add", segment_us=4_000_000)
-    run.server.publish("frame", message("frame", now, **DETAIL))
+    run.server.publish("frame", message("frame", told(now)))
     now = replace(now, time_us=5_002_000, segment_us=5_000_000)
-    run.server.publish("frame", message("frame", now, **DETAIL))
+    run.server.publish("frame", message("frame", told(now)))
     browser.wait(lambda: "announced Add" in browser.text("place"))
     said = list[str]()
     for _ in range(4):
@@ -216,7 +221,7 @@ _KEPT = """const [count, us, done] = arguments;
       const timeline = new Timeline(document.createElement("canvas"), { moved() {}, toggle() {} });
       for (let at = 0; at < count; at++) {
         const [grasp, health, began] = at % 2 ? ["Add", "degraded", at * us] : ["PoS", "", null];
-        timeline.follow([at * us, grasp, health, began === null ? "" : "Add", began], 0);
+        timeline.follow([[at * us, grasp, health, began === null ? "" : "Add", began]], at * us);
       }
       const [{ announced, health, segments }] = timeline.tracks;
       done([announced.length, health.length, segments.length, (timeline.last - announced[0].from) / 1e6]);
@@ -234,6 +239,35 @@ def test_the_past_that_a_page_keeps_is_bounded(page: Callable[..., Run], browser
     run.until(lambda: browser.text("grasp") == "Add")
 
 
+# The frames in which three painters ran: one at any time, one once, and one every 50 ms.
+_PACED = """const [done] = arguments;
+    import("/wire.js").then(async ({ paced }) => {
+      const seen = { often: [], once: [], again: [] }, frame = () => new Promise(requestAnimationFrame);
+      const painter = (name) => () => seen[name].push(document.timeline.currentTime);
+      const often = paced(painter("often")), once = paced(painter("once"), 1e9), again = paced(painter("again"), 50);
+      for (let call = 0; call < 5; call++) {
+        for (const ask of [often, once, again, often, once]) ask();
+        await frame();
+      }
+      const [start] = seen.again, last = seen.again.length;
+      again();
+      while (seen.again.length === last) await frame();
+      once(true);
+      await frame();
+      done([seen, start]);
+    });"""
+
+
+def test_what_is_painted_at_one_time_is_painted_in_one_frame(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    seen, start = browser.driver.execute_async_script(_PACED)
+    assert len(set(seen["often"])) == len(seen["often"]) == 5
+    assert seen["often"][0] == seen["once"][0] == start
+    # The last call counts, however soon it came; and what is asked for at once is not put off.
+    assert len(seen["once"]) == 2
+    run.until(lambda: browser.text("grasp") == "Add")
+
+
 def recording(predictions: list[Any], others: list[Any], truth: list[Any]) -> dict[str, Any]:
     """Return what an overview says of two builds."""
     changes = [[(time_us, grasp, "", "", None) for time_us, grasp in some] for some in (predictions, others)]
@@ -246,7 +280,7 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
     second = [(0, "none"), (600_000, "Add"), (2_000_000, "PoS"), (2_200_000, "Add")]
     truth = [(1, 500_000, 3_000_000, "Add"), (2, 4_000_000, 8_000_000, "Add"), (3, 8_500_000, 9_000_000, "PoS")]
     overview = recording(first, second, [*truth, (4, 8_100_000, 8_200_000, "Add"), (4, 0, 0, "")])
-    about = BUILD | {"hand": HAND, "builds": ["old", "new"]}
+    about = BUILD | {"builds": ["old", "new"], "silent_us": None}
 
     def reply(asked: Any) -> bytes:
         if asked["do"] == "overview":
@@ -255,8 +289,7 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             return message("overview", overview | {"have": asked["numbers"], "changes": [[], []], "truth": []})
         at = asked["numbers"][0]
         grasp = [grasp for time_us, grasp in first if time_us <= at][-1]
-        frame = {**to_builtins(replace(GRASP, grasp=grasp, time_us=at)), **DETAIL}
-        return message("moments", from_us=at, to_us=at, frames=[frame])
+        return message("moments", from_us=at, to_us=at, frames=[told(replace(GRASP, grasp=grasp, time_us=at))])
 
     with Server("live", "127.0.0.1:0", token=None, on_message=reply) as server:
         server.publish("replay", message("replay", about))

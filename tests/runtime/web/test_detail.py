@@ -18,10 +18,11 @@ from thenar.runtime.web.live import FrameText
 
 MakeBuild = Callable[..., Build]
 MakeGrasp = Callable[..., LiveGrasp]
+CLOCK_US = 1_700_000_000_000_000
 
 
 def shown(build: Build, moment: Moment) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(FrameText(build, Harness(name="x"))(moment))
+    found: dict[str, Any] = json.loads(FrameText(build, Harness(name="x"))(moment, CLOCK_US))
     return found
 
 
@@ -71,3 +72,19 @@ def test_a_refused_frame_shows_that_nothing_is_held(make_build: MakeBuild, make_
 def test_before_anything_was_read_nothing_is_claimed(make_build: MakeBuild, make_grasp: MakeGrasp) -> None:
     detail = shown(make_build(), Moment(make_grasp(), None, None, None))
     assert (detail["closed"], detail["joints"], detail["probabilities"]) == ("000000", None, None)
+
+
+@pytest.mark.parametrize("health", ["ok", "changing", "degraded", "unknown"])
+@pytest.mark.parametrize("state", ["none", "forming", "held", "releasing"])
+def test_timelines_show_a_moment_by_times_since_1970(
+    make_build: MakeBuild, make_grasp: MakeGrasp, health: str, state: str
+) -> None:
+    """A segment that forms may be revoked, and what is read in whole is no trouble."""
+    began_us = None if state == "none" else 1_000
+    grasp = replace(make_grasp(), time_us=3_000, health=health, state=state, segment_us=began_us, segment_type="hook")
+    moment = shown(make_build(), Moment(grasp, None, None, None))
+    segment = ["hook", CLOCK_US + 1_000] if state in ("held", "releasing") else ["", None]
+    trouble = health if health in ("degraded", "unknown") else ""
+    assert moment["change"] == [CLOCK_US + 3_000, grasp.grasp, trouble, *segment]
+    # What sinks send stays as it is.
+    assert (moment["time_us"], moment["segment_us"]) == (3_000, began_us)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Thread
+from time import time
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from msgspec.structs import replace
 
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.runtime import Build, Glove
+from thenar.runtime.frames import now_us
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.recogniser import Moment
 from thenar.runtime.published import LiveGrasp
@@ -24,9 +26,9 @@ from ..conftest import eventually
 NAMES = tuple(f"s{number}" for number in range(6))
 
 
-def glove_of(folder: Path, port: str) -> Glove:
+def glove_of(folder: Path, port: str, rate_hz: float = 100) -> Glove:
     names = json.dumps(NAMES)
-    text = f'name = "bench"\n[[stream]]\nport = "{port}"\nrate_hz = 100\nswitches = {names}\n[stream.board]\n'
+    text = f'name = "bench"\n[[stream]]\nport = "{port}"\nrate_hz = {rate_hz}\nswitches = {names}\n[stream.board]\n'
     return Glove(Build.load(folder), parse_harness(text, "bench"))
 
 
@@ -92,6 +94,25 @@ def test_a_glove_that_was_never_there_is_not_lost_since_some_time(
         assert hear(live)["words"] == f"{glove.devices()[0].name} not connected"
 
 
+@pytest.mark.parametrize(("rate_hz", "least_s", "most_s"), [(100, 0.5, 0.5), (0.5, 6.0, 6.5)])
+def test_pages_are_told_how_long_a_moment_is_current(
+    folder: Path, serve: Callable[..., Any], hear: Callable[..., Any], rate_hz: float, least_s: float, most_s: float
+) -> None:
+    """For half a second, or for three periods of a slow source; silences of the past are as long."""
+    client, glove = serve(), glove_of(folder, "tcp://127.0.0.1:1", rate_hz)
+    page = LivePage(client.server, glove, folder)
+    with client.open("/live?topics=build") as live:
+        silent_us = hear(live)["silent_us"]
+    assert least_s <= silent_us / 1e6 <= most_s
+    for time_us in (0, silent_us, 2 * silent_us + 1):
+        page._past.take((time_us, "hook", "", "", None))
+    assert [(time_us, kind) for time_us, kind, *_ in page._past.changes] == [
+        (0, "hook"),
+        (silent_us, ""),
+        (2 * silent_us + 1, "hook"),
+    ]
+
+
 def told_past(server: Server) -> dict[str, Any]:
     made = server._latest["past"]
     assert callable(made)
@@ -116,15 +137,17 @@ def test_the_past_holds_changes_alone_and_marks_silence(
     for time_s, changes in seconds:
         moment = replace(grasp, time_us=round(1e6 * time_s), **changes)
         page.show(Moment(moment, None, None, None))
+    clock_us = page._clock_us
+    assert time() - 1e-6 * (clock_us + now_us()) == pytest.approx(0, abs=1)
     assert told_past(server) == {
         "topic": "past",
-        "until_us": 9_000_000,
+        "until_us": clock_us + 9_000_000,
         "changes": [
-            [1_000_000, "hook", "", "", None],
-            [1_300_000, "hook", "", "hook", 1_150_000],
-            [1_400_000, "hook", "degraded", "hook", 1_150_000],
-            [1_400_000, "", "", "", None],
-            [9_000_000, "hook", "", "", None],
+            [clock_us + 1_000_000, "hook", "", "", None],
+            [clock_us + 1_300_000, "hook", "", "hook", clock_us + 1_150_000],
+            [clock_us + 1_400_000, "hook", "degraded", "hook", clock_us + 1_150_000],
+            [clock_us + 1_400_000, "", "", "", None],
+            [clock_us + 9_000_000, "hook", "", "", None],
         ],
     }
     # Another build goes on with it; and it has an end.

@@ -71,7 +71,7 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
         at = first + number * HELD_US + 900_000
         frame = asked(shown, "moments", at, at, 1)["frames"][0]
         assert (frame["closed"], frame["grasp"]) == (f"{row:06b}"[::-1], grasp)
-        assert at - 20_000 < frame["time_us"] <= at
+        assert at - 20_000 < frame["change"][0] <= at
         announced = [change[1] for change in overview["changes"][0] if change[0] <= at][-1]
         assert announced == grasp
     # The last one is done again.
@@ -81,7 +81,7 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
     ]
     assert overview["truth"][1][1] - first == HELD_US
     (final,) = asked(shown, "moments", last + 10**9, last + 2 * 10**9, 1)["frames"]
-    assert last - 10_000 <= final["time_us"] <= last
+    assert last - 10_000 <= final["change"][0] <= last
     about = json.loads(shown.about)
     assert (about["topic"], about["name"], about["builds"]) == ("replay", "anna.mcap", [folder.name])
 
@@ -108,7 +108,7 @@ def test_pages_get_moments_of_the_span_and_interval_that_they_ask_for(replay: Ca
         begin, length = (int(number) for number in random.integers((first - 10**5, 0), (last + 10**5, 10**6)))
         step = int(random.integers(1, 200_000))
         found = asked(shown, "moments", begin, begin + length, step)
-        times = [frame["time_us"] for frame in found["frames"]]
+        times = [frame["change"][0] for frame in found["frames"]]
         assert times[0] <= max(begin, first)
         assert all(later - earlier >= step for earlier, later in pairwise(times))
         assert all(begin < time_us <= begin + length for time_us in times[1:])
@@ -119,7 +119,7 @@ def test_pages_get_moments_of_the_span_and_interval_that_they_ask_for(replay: Ca
         assert (found["to_us"] == begin + length) == (len(times) < MOST_MOMENTS) or found["to_us"] >= times[-1]
     # At a change of the announced type there is a moment, so that a page that goes there shows it.
     for time_us in changes:
-        assert asked(shown, "moments", time_us, time_us, 1)["frames"][0]["time_us"] == time_us
+        assert asked(shown, "moments", time_us, time_us, 1)["frames"][0]["change"][0] == time_us
 
 
 def test_the_overview_comes_in_parts_that_join(replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,7 +212,7 @@ def test_before_it_is_read_a_moment_is_not_claimed(folder: Path, tmp_path: Path)
         found = asked(shown, "moments", last + 1, last + 10**6, 1)
         assert (found["frames"], found["to_us"]) == ([], last)
         found = asked(shown, "moments", last, last + 10**6, 1)
-        assert ([frame["time_us"] for frame in found["frames"]], found["to_us"]) == ([last], last)
+        assert ([frame["change"][0] for frame in found["frames"]], found["to_us"]) == ([last], last)
 
 
 def test_a_recording_that_lacks_an_input_of_the_build_is_refused(folder: Path, tmp_path: Path) -> None:
