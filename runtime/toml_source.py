@@ -1,6 +1,7 @@
 """A TOML file with its lines: errors name line and keys. All TOML that thenar reads is read here."""
 
 import codecs
+import math
 import re
 import tomllib
 from collections import Counter
@@ -51,14 +52,25 @@ class TomlText(Struct, frozen=True):
     raises: type[ThenarError]
 
     def tables(self) -> dict[str, object]:
-        """Return the content of the file; raises its error, with the line, if it is not TOML or exceeds a limit."""
+        """Return the content of the file; raises its error, with the line, if it is not TOML, exceeds a limit, or has a
+        number that is not finite.
+        """
         if len(self.text) > LARGEST:
             raise self.raises(f"{self.name} is longer than {LARGEST} characters, the limit for TOML: shorten it")
         try:
             _check_nesting(self.text)
-            return tomllib.loads(self.text)
+            tables = tomllib.loads(self.text)
         except ValueError as reason:
             raise self.raises(f"{self.name} is not valid TOML: {shortened(str(reason), _LONGEST_REASON)}") from reason
+        self._check_finite((), tables)
+        return tables
+
+    def _check_finite(self, place: Place, value: object) -> None:
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self.error(place, f"must be a finite number, not {value}")
+        inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+        for key, item in inside:
+            self._check_finite((*place, key), item)
 
     def error(self, place: Place, reason: str) -> ThenarError:
         """Return an error about the entry at `place`: "scene.toml, line 7: subjects[0].name: ..."."""

@@ -3,7 +3,6 @@
 All errors raised here are those of the source that is read.
 """
 
-import math
 import re
 from collections.abc import Collection, Mapping
 from typing import TypeVar
@@ -54,15 +53,6 @@ def check_keys(source: TomlText, place: Place, table: Mapping[str, object], know
     for key in table:
         if key not in known:
             raise source.error((*place, key), _advice(key, known))
-
-
-def check_finite(source: TomlText, place: Place, value: object) -> None:
-    """Raise the error of the first number in `value`, or inside it, that is not finite."""
-    if isinstance(value, float) and not math.isfinite(value):
-        raise source.error(place, f"must be a finite number, not {value}")
-    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, item in inside:
-        check_finite(source, (*place, key), item)
 
 
 def _advice(key: str, known: Collection[str]) -> str:

@@ -4,12 +4,12 @@ Rounding every row to whole steps moves a score by at most (inputs + 1)/2 steps,
 input's row. Two scores can therefore approach each other by at most inputs + 1 steps, and a frame whose best score
 leads by more than that keeps its grasp type. This holds for every scale: a coarser one only makes a step worth more.
 
-The row of a line becomes whole steps per distance from the middle of its range (terms/line.py), a byte each. This
-moves a score by at most half a step times the largest distance, which is at most 127. Where tables have lines, entries
-may have 8 bits, the upper halves of steps, which straight-line code adds in one instruction: rows of switches and bins
-are rounded to multiples of 256 steps, and only lines and bias use the full resolution of 16-bit sums. The bias compensates the mean rounding error: x
-times the error of a switch's row becomes (x - mean) times the error, which is no larger for x = 0 or 1. Such scores are
-relative to the last class, so there is one class less to add up.
+The row of a line becomes whole steps per distance from the middle of its range (terms/line.py), a byte each. This moves
+a score by at most half a step times the largest distance, which is at most 127. Where tables have lines, entries may
+have 8 bits, the upper halves of steps, which straight-line code adds in one instruction: rows of switches and bins are
+rounded to multiples of 256 steps, and only lines and bias use the full resolution of 16-bit sums. The bias compensates
+the mean rounding error: x times the error of a switch's row becomes (x - mean) times the error, which is no larger for
+x = 0 or 1. Such scores are relative to the last class, so there is one class less to add up.
 """
 
 import math

@@ -31,7 +31,7 @@ from thenar.drivers.errors import SettingError
 from ..names import fault, nearest, shortened
 from ..published import NONE, UNKNOWN, LiveGrasp, Preshape
 from ..toml_source import Place, read_source
-from ..toml_struct import check_finite, convert
+from ..toml_struct import convert
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -164,9 +164,7 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
     Raises SettingError naming the file, its line and the key.
     """
     source = read_source(_find(name), SettingError)
-    tables = source.tables()
-    check_finite(source, (), tables)
-    content = convert(source, (), tables, _File)
+    content = convert(source, (), source.tables(), _File)
     for place, reason in _faults(content):
         raise source.error(place, reason)
     names, factors = tuple(joint.name for joint in content.joints), [_TO_SI[joint.unit] for joint in content.joints]
