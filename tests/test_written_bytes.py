@@ -44,7 +44,7 @@ def kept(name: str, written: dict[str, str], update: bool) -> None:
 
 
 def builds_of(grasps: Path, glove: Path, folder: Path) -> dict[str, str]:
-    """Compile `grasps` with sums of 16 bits and a wiring, and lines with tables of 8 bits; return each file's digest."""
+    """Compile `grasps` with sums of 16 bits and a wiring, and lines of 8 bits; return the digest of each file."""
     whole, small = folder / "whole", folder / "small"
     common = ["compile", str(grasps), "--folds", "0", "--no-report"]
     assert run([*common, "-o", str(whole), "--glove", str(glove), "--rounds", "10"]) == 0

@@ -19,7 +19,7 @@ import msgspec
 from msgspec import json, structs
 
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import Sink, SinkError, SinkKind, SinkPlace
 
 
 class HeaderLine(msgspec.Struct, frozen=True, tag_field="kind", tag="header"):
@@ -104,18 +104,17 @@ class JsonLines(LineSink):
         self._rest = b""
         self._owned = owned
         self.where = where
-        self._gone = False
 
     def send(self, topic: str, line: bytes) -> None:
         """Write the rest of a line that a full disk cut, then this line, or lose it."""
         left, sent = self._rest + line, False
         try:
-            while left and not self._gone:
+            while left and not self.gone:
                 left = left[self._write(left) :]
-            self._rest, sent = b"", not self._gone
+            self._rest, sent = b"", not self.gone
         except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
             self.error = getattr(reason, "strerror", None) or str(reason)
-            self._gone = isinstance(reason, BrokenPipeError)
+            self.gone = isinstance(reason, BrokenPipeError)
             torn = len(line) - len(left)
             self._rest = left[: max(-torn, 0)] if torn <= 0 or self._takes_back(torn) else left
         if line:
@@ -142,10 +141,6 @@ class JsonLines(LineSink):
                     os.ftruncate(descriptor, end - torn)
                     return True
         return False
-
-    def report(self) -> SinkReport:
-        """Return how this sink is doing."""
-        return structs.replace(super().report(), gone=self._gone)
 
     def close(self) -> None:
         """Finish the line that was begun, if the reader allows, and close the file if it was opened here."""
