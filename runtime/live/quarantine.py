@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..build import Build
-from ..frames import Mask, SwitchFrame
+from ..frames import Mask, SwitchFrame, bits
 from ..published import Quarantined
 
 # Time for which contacts must stay the same before a grasp is evaluated.
@@ -271,8 +271,4 @@ def _flags(mask: Mask, bits: int) -> Flags:
 
 def numbers(mask: Mask) -> list[int]:
     """Return the numbers of the bits of `mask`."""
-    found = []
-    while mask:
-        found.append((mask & -mask).bit_length() - 1)
-        mask &= mask - 1
-    return found
+    return [bit.bit_length() - 1 for bit in bits(mask)]
