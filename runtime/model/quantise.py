@@ -101,34 +101,22 @@ class Extremes:
         self._first = 1 + tables.n_switches
         self._grids = np.array([1.0] + [2 * term.rounding_error(1.0, grid) for term in fixed])[:, np.newaxis]
 
-    def _at(self, scale: float, *, whole: bool) -> tuple[Floats, Floats]:
-        """Return the largest and smallest scaled rows, zero included, (1 + terms, K) each: bias, switches, joints at
-        the zeros of their lines, and grids.
-        """
-        upper, lower = self._upper, self._lower
-        if self._lines:
-            upper, lower = upper.copy(), lower.copy()
-            for line in self._lines:
-                offset = line.offset(scale)
-                upper[self._first + line.joint] += offset
-                lower[self._first + line.joint] += offset
-        upper, lower = upper * scale, lower * scale
-        if whole:
-            upper, lower = np.rint(upper / self._grids) * self._grids, np.rint(lower / self._grids) * self._grids
-        return np.maximum(upper, 0), np.minimum(lower, 0)
-
     def reach(self, scale: float, *, whole: bool = True) -> float:
         """Return the largest absolute value of a partial sum of the scaled rows, in any order; infinity if an entry of
         a slope's row does not fit its byte.
         """
-        upper, lower = self._at(scale, whole=whole)
         slopes = [line.whole(scale, 1) if whole else line.slope(scale) for line in self._lines]
         if whole and any(np.abs(slope.row).max() > LARGEST_SLOPE for slope in slopes):
             return math.inf
-        for slope in slopes:
-            largest, smallest = slope.ends
-            upper, lower = np.vstack([upper, largest]), np.vstack([lower, smallest])
-        return float(max(upper.sum(axis=0).max(), -lower.sum(axis=0).min()))
+        # Bins count at the zeros of their joint's line.
+        offsets = np.zeros_like(self._upper)
+        for line in self._lines:
+            offsets[self._first + line.joint] = line.offset(scale)
+        rows = [(self._upper + offsets) * scale, (self._lower + offsets) * scale]
+        if whole:
+            rows = [np.rint(each / self._grids) * self._grids for each in rows]
+        upper, lower = (np.vstack(ends) for ends in zip(rows, *(slope.ends for slope in slopes), strict=True))
+        return float(max(np.maximum(upper, 0).sum(axis=0).max(), -np.minimum(lower, 0).sum(axis=0).min()))
 
 
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
