@@ -165,7 +165,7 @@ def tree_text(tree: Tree | None, manifest: Manifest) -> tuple[str, str]:
 
 
 def worst_sentence(content: ReportContent) -> str:
-    """Return what rounding can change in any frame; "" without a comparison."""
+    """Return the effect of rounding in any frame; "" without a comparison."""
     found, rows = content.comparison, content.manifest.source.rows
     if found is None:
         return ""

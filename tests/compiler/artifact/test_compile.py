@@ -241,7 +241,7 @@ def test_what_makes_no_build_is_refused_and_nothing_written(
 
 
 def test_tables_for_narrow_entries_are_coarser_say_so_and_hold(grasp_set: GraspSet, tmp_path: Path) -> None:
-    lines = {"trainer": "linear", "folds": 0}
+    lines: dict[str, Any] = {"trainer": "linear", "folds": 0}
     wide = compile_build(grasp_set, tmp_path / "wide", **lines).manifest
     narrow = compile_build(grasp_set, tmp_path / "narrow", table_bits=8, **lines).manifest
     tables = Build.load(tmp_path / "narrow").tables
