@@ -1,6 +1,6 @@
 """The same frames through the ensemble, the float tables and the integer tables: differences compared with bounds."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.model.quantise import as_deployed, rounding_error
 from thenar.runtime.model.tables import ScoreTables, winners
+from thenar.runtime.model.terms.base import HIGHEST_CODE, CoreTerm
 from thenar.runtime.model.terms.bit import Bit
+from thenar.runtime.model.terms.line import Line
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from ..elementary import Floats
@@ -70,25 +72,34 @@ def worst_difference(tables: ScoreTables, integers: IntegerTables) -> float:
 
 def _differences(tables: ScoreTables, integers: IntegerTables) -> Iterator[Floats]:
     """Yield the differences (c, K) of every input alone, or of both joints of a grid, the largest ones among them."""
-    states, lines = np.arange(2), {line.joint: line.steps for line in integers.lines}
-    for bit, rounded in zip(tables.bits, integers.bits, strict=True):
-        yield integers.scale * bit.of(states) - rounded.of(states)
+    states = np.arange(2)
+    for bit, whole in zip(tables.bits, integers.bits, strict=True):
+        yield integers.scale * bit.of(states) - whole.of(states)
     for unit in integers.units:
         ours, theirs = (
             [term for term in of.core_terms if not isinstance(term, Bit) and {*term.inputs} <= {*unit}]
             for of in (tables, integers)
         )
-        # Between two codes after which these change, scores lie on a straight line, and integers are constant.
-        steps = [
-            np.unique(np.concatenate([tables.steps_of(joint), integers.steps_of(joint), *lines.get(joint, ())]))
-            for joint in unit
-        ]
-        codes = map(integers.turning_codes, unit, steps)
+        # Scores lie on straight lines between these codes, and steps are constant.
+        stepped = [*theirs, *(term for term in ours if not isinstance(term, Line))]
+        codes = [_codes_about_steps(joint, stepped) for joint in unit]
         at = dict(zip(unit, (each.ravel() for each in np.meshgrid(*codes, indexing="ij")), strict=True))
-        scores, whole = (
+        scores, steps = (
             np.stack([term.of(*(at[joint] for joint in term.inputs)) for term in terms]) for terms in (ours, theirs)
         )
-        yield integers.scale * scores.sum(axis=0) - whole.sum(axis=0)
+        yield integers.scale * scores.sum(axis=0) - steps.sum(axis=0)
+
+
+def _codes_about_steps(joint: int, terms: Iterable[CoreTerm]) -> NDArray[np.int64]:
+    """Return the codes before and after every step of the terms of a joint, and the ends of all codes."""
+    steps = [
+        steps.astype(np.int64)
+        for term in terms
+        for number, steps in zip(term.inputs, term.steps, strict=True)
+        if number == joint
+    ]
+    codes = np.concatenate([[0, HIGHEST_CODE], *steps, *(after + 1 for after in steps)])
+    return np.unique(codes[codes <= HIGHEST_CODE])
 
 
 def float_slack(tables: ScoreTables, scale: float) -> float:
