@@ -85,9 +85,10 @@ def _differences(tables: ScoreTables, integers: IntegerTables) -> Iterator[Float
         codes = [_codes_about_steps(joint, stepped) for joint in unit]
         at = dict(zip(unit, (each.ravel() for each in np.meshgrid(*codes, indexing="ij")), strict=True))
         scores, steps = (
-            np.stack([term.of(*(at[joint] for joint in term.inputs)) for term in terms]) for terms in (ours, theirs)
+            np.sum([term.of(*(at[joint] for joint in term.inputs)) for term in terms], axis=0, dtype=np.float64)
+            for terms in (ours, theirs)
         )
-        yield integers.scale * scores.sum(axis=0) - steps.sum(axis=0)
+        yield integers.scale * scores - steps
 
 
 def _codes_about_steps(joint: int, terms: Iterable[CoreTerm]) -> NDArray[np.int64]:

@@ -119,8 +119,8 @@ def worst_frames(case: Quantised) -> Iterator[tuple[list[bool], list[int]]]:
         errors.append([[exact - deployed for exact, deployed in zip(*run, strict=True)] for run in runs])
     for k in range(case.integers.n_classes):
         for pick in (max, min):
-            columns = [[error[k] for error in of_input] for of_input in errors]
-            frame = [options[column.index(pick(column))] for options, column in zip(values, columns, strict=True)]
+            places = [pick(range(len(of_input)), key=lambda at, of=of_input: of[at][k]) for of_input in errors]
+            frame = [options[place] for options, place in zip(values, places, strict=True)]
             yield [*map(bool, frame[:n_switches])], frame[n_switches:]
 
 
