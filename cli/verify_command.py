@@ -13,6 +13,7 @@ from .printing import echo, json_flag, out, progress, show, table
 if TYPE_CHECKING:
     from thenar.compiler.artifact.verify import FaultCheck, Verification
     from thenar.compiler.artifact.verify_firmware import FirmwareVerification, TargetCheck
+    from thenar.compiler.model.compare import WorstCase
 
 _SHOWN = 20
 
@@ -37,7 +38,7 @@ def _kinds() -> tuple[str, ...]:
 def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bool) -> int:
     """Classify every row with ensemble, float tables and integer tables, and check the differences against bounds.
 
-    The worst integer error of all is not searched for among the rows: it is calculated over all possible frames.
+    The worst integer error is not searched for among the rows: it is calculated over all possible frames.
 
     With --firmware, every score, grasp type, margin and probability of the compiled classifiers, and every state of
     segments that were learnt, is compared with Python's: on every row, on 10,000 random frames and on all extreme ones.
@@ -73,18 +74,19 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bo
 
 
 def _print(found: "Verification") -> None:
-    from thenar.runtime.model.integers import LIMIT
-
-    trials = counted(found.trials, "trial")
+    trials, worst = counted(found.trials, "trial"), found.worst
     echo(f"{counted(found.rows, 'row')} of {trials}; the build was trained on {found.trained_on:,} of these trials")
     collapse = f"at most {found.collapse_difference:.3g} of a unit, allowed {found.collapse_bound:.3g}"
     echo(f"ensemble to float tables: {collapse}")
-    steps = f"at most {found.integer_difference:.3f} steps, {found.integer_worst:.3f} in the worst possible frame"
-    echo(f"float tables to integers: {steps}, allowed {found.integer_bound:g}")
+    echo(f"float tables to integers: at most {found.integer_difference:.3f} steps, allowed {found.integer_bound:g}")
+    _print_margin(f"{found.safe_margin:g} steps", found)
+    frame = f"{len(worst.closed)} switches closed, codes {' '.join(map(str, worst.codes)) or 'none'}"
     echo(
-        f"margin above {found.safe_margin:g} steps: {found.covered} rows, of which {found.covered_changed} change class"
+        f"worst possible frame: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.competitor}, "
+        f"allowed {worst.bound:.3f} ({frame})"
     )
-    echo(f"largest possible sum, with or without missing inputs: {found.largest_sum}, allowed {LIMIT}")
+    _print_margin(f"{worst.safe_margin:.3f} steps, which covers the worst frames", worst)
+    echo(f"largest possible sum, with or without missing inputs: {worst.reach}, allowed {worst.limit}")
     whose = {0: "trials not trained on", found.trials: "trials trained on"}.get(
         found.trained_on, f"{found.trained_on} of {trials} trained on"
     )
@@ -106,6 +108,10 @@ def _print(found: "Verification") -> None:
     if found.firmware is not None:
         print_firmware(found.firmware)
     echo("holds" if found.holds else verdict(found.firmware))
+
+
+def _print_margin(margin: str, found: "Verification | WorstCase") -> None:
+    echo(f"margin above {margin}: {found.covered} rows, of which {found.covered_changed} change class")
 
 
 def _print_faults(found: "FaultCheck") -> None:

@@ -221,7 +221,7 @@ class Adaptation:
         """The features (n, l) of the lines: the dot product of two frames' is their kernel."""
         places = np.zeros((len(self._lines), len(self._rows)))
         for number, line in enumerate(self._lines):
-            above = line.distances(self.codes[self._rows, line.joint])
+            above = line.parts(self.codes[self._rows, line.joint])[1][:, 0]
             places[number] = (above / (line.high - line.low) - 0.5) * _FIFTHS * math.sqrt(STEEP)
         return forward(self._triangle, places).T
 

@@ -17,7 +17,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..facts import Fact, facts
 from ..hand import HandShape
-from ..model.compare import Comparison
+from ..model.compare import Comparison, worst_case
 from ..model.faults import FaultCounts
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
@@ -136,6 +136,7 @@ class Documents:
 
         rows = made.recogniser.read(made.recogniser.samples)
         tables = tables_to_bytes(made.tables)
+        names = [switch.name for switch in made.manifest.switches]
         return report_html(
             ReportContent(
                 manifest=made.manifest,
@@ -153,6 +154,7 @@ class Documents:
                 transitions=_transitions(made.grasp_set),
                 comparison=made.comparison,
                 faults=made.faults,
+                worst=worst_case(made.recogniser.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )
 

@@ -13,7 +13,7 @@ from thenar.runtime.manifest import Faults, Unit
 from thenar.runtime.published import LiveGrasp
 
 from ..evaluation.rates import rated
-from ..model.compare import compare
+from ..model.compare import WorstCase, compare, worst_case
 from ..model.faults import count_faults, groups_of, worst_faults
 from ..recogniser import predicted_classes
 from ..recordings.graspset import GraspSet
@@ -71,11 +71,10 @@ class Verification(Struct, frozen=True, kw_only=True):
     """The result of verification on `rows` rows: differences, and the bounds that they must keep.
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
-    integers, in steps: integer_worst in the worst of all frames, recorded or not. largest_sum is the largest sum of
-    integers in any frame, whole or with inputs missing. covered counts rows whose margin exceeds safe_margin,
-    covered_changed those of them that change. recognised counts trials of grasps, and frames where trials have several;
-    independent says that each recorded row is a trial. The build was trained on trained_on of the trials. nothing_held
-    is present if the build can predict that nothing is held. firmware is present if requested.
+    integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
+    recognised counts trials of grasps, and frames where trials have several; independent says that each recorded row is
+    a trial. The build was trained on trained_on of the trials. nothing_held is present if the build can predict that
+    nothing is held. worst looks beyond the rows; firmware is present if requested.
     """
 
     rows: int
@@ -85,13 +84,12 @@ class Verification(Struct, frozen=True, kw_only=True):
     collapse_difference: float
     collapse_bound: float
     integer_difference: float
-    integer_worst: float
     integer_bound: float
     safe_margin: float
     covered: int
     covered_changed: int
     recognised: tuple[Counted, ...]
-    largest_sum: int
+    worst: WorstCase
     changed: tuple[ChangedRow, ...]
     holds: bool
     firmware: FirmwareVerification | None = None
@@ -143,6 +141,8 @@ def verify(
     model = load_ensemble(Path(folder), build)
     bits, codes = select_inputs(grasp_set, build.manifest)
     comparison = compare(model, build.tables, bits, codes, progress)
+    names = [switch.name for switch in build.manifest.switches]
+    worst = worst_case(model, build.tables, comparison, build.grasps, names)
     grasps, empty = np.array(build.grasps), grasp_set.is_none
     predicted = predicted_classes(build.tables, build.manifest.rejection, bits, codes)
     number = build.none if build.rejector is None else len(grasps)
@@ -161,13 +161,12 @@ def verify(
         collapse_difference=comparison.collapse_difference,
         collapse_bound=comparison.collapse_bound,
         integer_difference=comparison.integer_difference,
-        integer_worst=comparison.integer_worst,
         integer_bound=comparison.integer_bound,
         safe_margin=comparison.safe_margin,
         covered=int(np.count_nonzero(comparison.covered)),
         covered_changed=int(np.count_nonzero(comparison.covered[comparison.changed])),
         recognised=_recognised(comparison.trained, predicted, grasps, grasp_set),
-        largest_sum=build.tables.bound,
+        worst=worst,
         changed=tuple(
             ChangedRow(
                 row=int(row),
@@ -178,7 +177,7 @@ def verify(
             )
             for row in comparison.changed
         ),
-        holds=comparison.holds and (compiled is None or compiled.holds),
+        holds=comparison.holds and worst.holds and (compiled is None or compiled.holds),
         nothing_held=nothing_held,
         firmware=compiled,
     )

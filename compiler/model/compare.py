@@ -1,17 +1,16 @@
 """The same frames through the ensemble, the float tables and the integer tables: differences compared with bounds."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
-from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.integers import LIMIT, IntegerTables
+from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import as_deployed, rounding_error
-from thenar.runtime.model.tables import ScoreTables, winners
-from thenar.runtime.model.terms.base import HIGHEST_CODE, CoreTerm
-from thenar.runtime.model.terms.bit import Bit
-from thenar.runtime.model.terms.line import Line
+from thenar.runtime.model.tables import TIE, ScoreTables, winners
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from ..elementary import Floats
@@ -29,15 +28,13 @@ class Comparison:
     """The results for n rows on the way from the ensemble to integers.
 
     collapse_difference and its bound are in units of score; integer_difference, its bound and the additional error of
-    doubles, the slack, are in steps; integer_worst is the difference in the worst of all frames, recorded or not.
-    trained and deployed (n,) are the classes by the ensemble and by the integers, covered (n,) the rows whose float
-    margin exceeds the safe margin.
+    doubles, the slack, are in steps. trained and deployed (n,) are the classes by the ensemble and by the integers,
+    covered (n,) the rows whose float margin exceeds the safe margin.
     """
 
     collapse_difference: float
     collapse_bound: float
     integer_difference: float
-    integer_worst: float
     integer_bound: float
     slack: float
     safe_margin: float
@@ -53,54 +50,61 @@ class Comparison:
 
     @property
     def holds(self) -> bool:
-        """Whether all differences are within their bounds and no covered row changes class."""
+        """Whether both differences are within their bounds and no covered row changes class."""
         collapsed = self.collapse_difference <= self.collapse_bound
-        rounded = max(self.integer_difference, self.integer_worst) <= self.integer_bound + self.slack
+        rounded = self.integer_difference <= self.integer_bound + self.slack
         return collapsed and rounded and not self.covered[self.changed].any()
 
 
-def worst_difference(tables: ScoreTables, integers: IntegerTables) -> float:
-    """Return the most steps by which a score of the integers, made from these tables, is off in any frame.
+class WorstCase(Struct, frozen=True, kw_only=True):
+    """What integers can do at worst, in steps, exactly and over every frame there is, recorded or not.
 
-    Inputs are independent, except for the joints of a grid: a score is off by most, or least, where every input is.
+    In the frame `closed` (names of kept switches) and `codes`, `leader` loses most of its lead over `competitor`.
+    A margin above safe_margin keeps its grasp type: true of `covered` rows, of which `covered_changed` change all the
+    same. No sum gets further than `reach` from zero, in any order, whole or with inputs missing.
     """
-    greatest = least = integers.scale * tables.bias - integers.bias
-    for off in _differences(tables, integers):
-        greatest, least = greatest + off.max(axis=0), least + off.min(axis=0)
-    return float(max(greatest.max(), -least.min()))
+
+    leader: str
+    competitor: str
+    loss: float
+    bound: float
+    closed: tuple[str, ...]
+    codes: tuple[int, ...]
+    safe_margin: float
+    covered: int
+    covered_changed: int
+    reach: int
+    limit: int = LIMIT
+
+    @property
+    def holds(self) -> bool:
+        """Whether no lead can lose more than the bound, and no covered row changes."""
+        return self.loss <= self.bound and not self.covered_changed
 
 
-def _differences(tables: ScoreTables, integers: IntegerTables) -> Iterator[Floats]:
-    """Yield the differences (c, K) of every input alone, or of both joints of a grid, the largest ones among them."""
-    states = np.arange(2)
-    for bit, whole in zip(tables.bits, integers.bits, strict=True):
-        yield integers.scale * bit.of(states) - whole.of(states)
-    for unit in integers.units:
-        ours, theirs = (
-            [term for term in of.core_terms if not isinstance(term, Bit) and {*term.inputs} <= {*unit}]
-            for of in (tables, integers)
-        )
-        # Scores lie on straight lines between these codes, and steps are constant.
-        stepped = [*theirs, *(term for term in ours if not isinstance(term, Line))]
-        codes = [_codes_about_steps(joint, stepped) for joint in unit]
-        at = dict(zip(unit, (each.ravel() for each in np.meshgrid(*codes, indexing="ij")), strict=True))
-        scores, steps = (
-            np.sum([term.of(*(at[joint] for joint in term.inputs)) for term in terms], axis=0, dtype=np.float64)
-            for terms in (ours, theirs)
-        )
-        yield integers.scale * scores - steps
+def worst_case(
+    model: Model, integers: IntegerTables, comparison: Comparison, grasps: Sequence[str], switches: Sequence[str]
+) -> WorstCase:
+    """Return the proof about `integers` over all frames, and which rows of `comparison` that covers.
 
-
-def _codes_about_steps(joint: int, terms: Iterable[CoreTerm]) -> NDArray[np.int64]:
-    """Return the codes before and after every step of the terms of a joint, and the ends of all codes."""
-    steps = [
-        steps.astype(np.int64)
-        for term in terms
-        for number, steps in zip(term.inputs, term.steps, strict=True)
-        if number == joint
-    ]
-    codes = np.concatenate([[0, HIGHEST_CODE], *steps, *(after + 1 for after in steps)])
-    return np.unique(codes[codes <= HIGHEST_CODE])
+    They were made from `model`; `grasps` and `switches` are the names of its classes and kept switches.
+    """
+    rounding = Rounding(as_deployed(collapse(model, integers.n_switches), integers.grid), integers)
+    frame, safe = rounding.worst_of_all(), float(rounding.safe_margin())
+    # Scores that the ensemble treats as tied are decided by the number of the class.
+    covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack
+    return WorstCase(
+        leader=grasps[frame.leader],
+        competitor=grasps[frame.competitor],
+        loss=float(frame.loss),
+        bound=comparison.safe_margin + 2 * comparison.slack,
+        closed=tuple(name for name, bit in zip(switches, frame.bits.tolist(), strict=True) if bit),
+        codes=tuple(frame.codes.tolist()),
+        safe_margin=safe,
+        covered=int(np.count_nonzero(covered)),
+        covered_changed=int(np.count_nonzero(covered[comparison.changed])),
+        reach=integers.bound,
+    )
 
 
 def float_slack(tables: ScoreTables, scale: float) -> float:
@@ -143,7 +147,6 @@ def compare(
         collapse_difference=float(np.abs(scores - by_tables).max()),
         collapse_bound=COLLAPSE_TOLERANCE * model.magnitude,
         integer_difference=float(np.abs(steps - by_integers).max()),
-        integer_worst=worst_difference(tables, integers),
         integer_bound=error,
         slack=slack,
         safe_margin=2 * error,

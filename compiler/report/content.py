@@ -15,7 +15,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from ..facts import Fact
 from ..frontier.points import Frontier
 from ..hand import HandShape
-from ..model.compare import Comparison
+from ..model.compare import Comparison, WorstCase
 from ..model.faults import FaultCounts
 from ..movements.transitions import Transitions
 from ..placement.tree import Tree
@@ -37,6 +37,7 @@ class ReportContent:
     comparison    the training rows, through the model, its tables and the integers
     faults        the effect of each input fault on the training rows
     transitions   how often each type follows each, where the recordings are whole movements
+    worst         the worst case of the integers over all possible frames
 
     Raises BuildError where parts are inconsistent.
     """
@@ -55,6 +56,7 @@ class ReportContent:
     harness: Harness | None = None
     comparison: Comparison | None = None
     faults: FaultCounts | None = None
+    worst: WorstCase | None = None
     transitions: Transitions | None = None
 
     def __post_init__(self) -> None:

@@ -165,31 +165,30 @@ def tree_text(tree: Tree | None, manifest: Manifest) -> tuple[str, str]:
 
 
 def worst_sentence(content: ReportContent) -> str:
-    """Return the effect of rounding in any frame; "" without a comparison."""
-    found, rows = content.comparison, content.manifest.source.rows
-    if found is None:
+    """Return the guarantee of the worst-case analysis; "" without one."""
+    rows, worst = content.manifest.source.rows, content.worst
+    if worst is None:
         return ""
-    covered = int(np.count_nonzero(found.covered))
-    share = f" ({percent(covered / rows, NBSP)})" if rows else ""
+    share = f" ({percent(worst.covered / rows, NBSP)})" if rows else ""
     return (
-        f"In the worst case over all possible frames, recorded or not, a score is off by {found.integer_worst:.3f} "
-        f"steps. A lead of more than {found.safe_margin:.3f} steps is safe: {covered:,} of {rows:,}{share} training "
-        "rows have it."
+        f"In the worst case over all possible frames, recorded or not, {worst.leader} loses {worst.loss:.3f} steps "
+        f"of its lead over {worst.competitor}. By this exact analysis, ties included, a lead of more than "
+        f"{worst.safe_margin:.3f} steps is safe: {worst.covered:,} of {rows:,}{share} training rows have it."
     )
 
 
 def guarantee_table(content: ReportContent) -> PlainTable | None:
-    """Return the differences and their bounds; None without a comparison."""
-    found, proof = content.comparison, content.manifest.proof
-    if found is None:
+    """Return the differences and their bounds; None without a worst-case analysis."""
+    found, worst = content.comparison, content.worst
+    if found is None or worst is None:
         return None
-    most, integer_bound = 2 ** (proof.width - 1) - 1, f"{found.integer_bound + found.slack:.3f}"
+    most, integer_bound = 2 ** (content.manifest.proof.width - 1) - 1, found.integer_bound + found.slack
     float_difference, float_bound = f"{found.collapse_difference:.3g}", f"{found.collapse_bound:.3g}"
     rows = (
         ("Ensemble vs. float tables, units of score", float_difference, float_bound),
-        ("Float tables vs. integers, steps", f"{found.integer_difference:.3f}", integer_bound),
-        ("The same in the worst of all frames, steps", f"{found.integer_worst:.3f}", integer_bound),
-        ("Largest magnitude of a sum, steps", f"{proof.bound:,}", f"{most:,}"),
+        ("Float tables vs. integers, steps", f"{found.integer_difference:.3f}", f"{integer_bound:.3f}"),
+        ("Largest loss of a lead, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
+        ("Largest magnitude of a sum, steps", f"{worst.reach:,}", f"{most:,}"),
     )
     caption = f"Differences and their bounds ({recipe(content.manifest)})"
     return PlainTable(caption, ("What", "Found", "Bound"), rows)

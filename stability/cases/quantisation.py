@@ -2,19 +2,21 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 
-from thenar.compiler.model.compare import float_slack, worst_difference
+from thenar.compiler.model.compare import float_slack
 from thenar.runtime.model.integers import MAX_SWITCHES, IntegerTables
+from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.base import Floats
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
 from ..finding import Finding
-from ..inputs.hard_tables import every_frame, listed, rows_of, values_of
+from ..inputs.hard_tables import every_frame, listed, rows_of
 from ..inputs.small_sets import small_build, small_set
 from ..reference.tables import rows_of_frame
 
@@ -101,68 +103,60 @@ def both_scores(case: Quantised, frames: Iterable[tuple[Sequence[bool], Sequence
     return runs, parts
 
 
-def most_off(case: Quantised, frames: Iterable[tuple[Sequence[bool], Sequence[int]]]) -> Fraction:
-    """Return the most steps by which a score of the integers is off in some of these frames, exactly."""
-    runs, parts = both_scores(case, frames)
-    return Fraction(max(abs(exact - deployed) for run in runs for exact, deployed in zip(*run, strict=True)), parts)
-
-
-def worst_frames(case: Quantised) -> Iterator[tuple[list[bool], list[int]]]:
-    """Yield the frames in which the integers are furthest below, and above, the exact scores of each class.
-
-    Errors of inputs add up: each input takes its worst value, as judged in a frame in which all others are 0.
-    """
-    values, n_switches, errors = values_of(case.tables), case.integers.n_switches, []
-    for place, options in enumerate(values):
-        alone = [[option * (at == place) for at in range(len(values))] for option in options]
-        runs, _ = both_scores(case, [([*map(bool, each[:n_switches])], each[n_switches:]) for each in alone])
-        errors.append([[exact - deployed for exact, deployed in zip(*run, strict=True)] for run in runs])
-    for k in range(case.integers.n_classes):
-        for pick in (max, min):
-            places = [pick(range(len(of_input)), key=lambda at, of=of_input: of[at][k]) for of_input in errors]
-            frame = [options[place] for options, place in zip(values, places, strict=True)]
-            yield [*map(bool, frame[:n_switches])], frame[n_switches:]
+def lost(run: Run, leader: int, other: int) -> int:
+    """Return the lost parts of the lead of class `leader` over `other`."""
+    exact, deployed = run
+    return (exact[leader] - exact[other]) - (deployed[leader] - deployed[other])
 
 
 def findings(full: bool) -> Iterator[Finding]:
     """Compare the integers with exact scores in frames, in all frames of small tables, and with plain counting."""
-    yield from _worst_frames(range(40 if full else 3))
+    witnesses, leads = _worst_frames(range(40 if full else 3))
+    yield witnesses
     yield from _all_frames(range(12 if full else 2))
+    yield leads
     yield _half_steps(full)
 
 
-def _worst_frames(seeds: range) -> Iterator[Finding]:
+def _worst_frames(seeds: range) -> tuple[Finding, Finding]:
+    worst = Finding.of("worst frame of every pair of classes", "60 digits and the scorer, in that frame", 0, "steps")
     cases = list(_tables(seeds))
-    # The error of doubles on the way. As a share of n + 1 steps, it is the same for all of these tables.
-    slack = max(float_slack(case.tables, case.integers.scale) for case in cases)
-    computed = Finding.of("score most off in any frame", "60 digits and the scorer, in that frame", slack, "steps")
-    # Half a step for the bias and each input's row.
-    bound = (_N + 1) / 2 + slack
-    off = Finding.of("score off in the worst frame, 4 to 16 bits", "half a step an input", bound, "steps")
+    # Half a step for the bias and each input's row, twice, for two classes; plus the error of doubles on the way. As a
+    # share of n + 1 steps, which is the same for all of these tables.
+    slack = max(2 * float_slack(case.tables, case.integers.scale) for case in cases)
+    leads = Finding.of("lead lost in the worst frame, 4 to 16 bits", "half a step an input", _N + 1 + slack, "steps")
     small = small_build(small_set(7, rows=200, switches=24, joints=3, types=6, noise=0.15), rounds=40)
     compiled = Quantised("a compiled build", small.tables, small.build.tables)
     for case in (compiled, *cases):
-        most = worst_difference(case.tables, case.integers)
-        computed.see(float(abs(most_off(case, worst_frames(case)) - Fraction(most))), case.name)
+        rounding = Rounding(case.tables, case.integers)
+        pairs = list(permutations(range(case.integers.n_classes), 2))
+        frames = [rounding.worst(*pair) for pair in pairs]
+        runs, parts = both_scores(case, ((frame.bits.tolist(), frame.codes.tolist()) for frame in frames))
+        for pair, frame, run in zip(pairs, frames, runs, strict=True):
+            error = float(abs(Fraction(lost(run, *pair), parts) - frame.loss))
+            worst.see(error, f"{case.name}, classes {pair[0]} and {pair[1]}")
         if case is not compiled:
-            off.see(most, case.name)
-    yield from (computed, off)
+            leads.see(float(rounding.worst_of_all().loss), case.name)
+    return worst, leads
 
 
 def _all_frames(seeds: range) -> Iterator[Finding]:
-    """Small tables: compare the worst frames with all others."""
-    most = Finding.of("largest error of any frame", "60 digits, every frame there is", 0, "steps")
+    """Small tables: compare the computed loss of the worst frame with the largest loss of any frame."""
+    most = Finding.of("largest loss of any frame, all pairs", "60 digits, every frame there is", 0, "steps")
     # A share of the proven bound: no frame can exceed 1.
     overturned = Finding.of(
         "widest margin that integers reverse", "60 digits, every frame there is", 1, "of the safe margin"
     )
     for case in _small(seeds):
+        rounding = Rounding(case.tables, case.integers)
         runs, parts = both_scores(case, every_frame(case.tables))
-        error = most_off(case, every_frame(case.tables)) - most_off(case, worst_frames(case))
-        most.see(float(abs(error)), case.name, len(runs))
+        for pair in permutations(range(case.integers.n_classes), 2):
+            error = abs(Fraction(max(lost(run, *pair) for run in runs), parts) - rounding.worst(*pair).loss)
+            most.see(float(error), f"{case.name}, classes {pair[0]} and {pair[1]}", len(runs))
         turned = (exact for exact, deployed in runs if exact.index(max(exact)) != deployed.index(max(deployed)))
         margin = Fraction(max((max(exact) - sorted(exact)[-2] for exact in turned), default=0), parts)
-        overturned.see(float(margin) / (2 * worst_difference(case.tables, case.integers)), case.name, len(runs))
+        # Nothing is reversed if the safe margin is 0.
+        overturned.see(float(margin / rounding.safe_margin()) if margin else 0.0, case.name, len(runs))
     yield from (most, overturned)
 
 
@@ -171,7 +165,8 @@ def _half_steps(full: bool) -> Finding:
     worst = Finding.of("all rows half a step off", "half a step an input, exactly", 0, "steps")
     for switches, width in ((1, 4), (1, 16), (2, 8), (31, 8), (MAX_SWITCHES if full else 256, 16)):
         case = quantised(f"{switches} switches, {width} bits", half_a_step_off(switches, 2 ** (width - 1) - 1), width)
-        worst.see(abs(worst_difference(case.tables, case.integers) - (switches + 1) / 2), case.name)
+        loss = Rounding(case.tables, case.integers).worst_of_all().loss
+        worst.see(float(abs(loss - (switches + 1))), case.name)
     return worst
 
 

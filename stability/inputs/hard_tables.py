@@ -39,16 +39,10 @@ def largest_sum(inputs: Iterable[Sequence[Sequence[float]]]) -> float:
     return reached
 
 
-def values_of(tables: ScoreTables | IntegerTables) -> list[list[int]]:
-    """Return for each switch 0 and 1, and for each joint the lowest and the highest codes of its bins."""
+def every_frame(tables: ScoreTables | IntegerTables) -> Iterator[tuple[tuple[bool, ...], tuple[int, ...]]]:
+    """Yield bits and codes for every combination of open and closed switches, and lowest and highest codes of bins."""
     ends = []
     for thresholds in tables.thresholds:
         below = [int(code) for code in thresholds]
         ends.append(sorted({0, *below, *(code + 1 for code in below if code < HIGHEST_CODE), HIGHEST_CODE}))
-    return [[0, 1]] * tables.n_switches + ends
-
-
-def every_frame(tables: ScoreTables | IntegerTables) -> Iterator[tuple[tuple[bool, ...], tuple[int, ...]]]:
-    """Yield bits and codes for every combination of open and closed switches, and lowest and highest codes of bins."""
-    ends = values_of(tables)[tables.n_switches :]
-    yield from product(product((False, True), repeat=tables.n_switches), product(*ends))
+    yield from product(product((False, True), repeat=len(tables.switch_rows)), product(*ends))

@@ -34,15 +34,19 @@ def test_a_sound_build_holds(set_file: Path, build_folder: Path) -> None:
     assert done.stdout.endswith("holds\n")
 
 
-def test_the_worst_of_all_frames_is_printed_beside_its_bound(set_file: Path, build_folder: Path) -> None:
+def test_the_worst_of_all_frames_is_printed_beside_its_bounds(set_file: Path, build_folder: Path) -> None:
     lines = thenar("verify", build_folder, set_file).stdout.splitlines()
-    found = json.loads(thenar("verify", build_folder, set_file, "--json").stdout)
+    worst = json.loads(thenar("verify", build_folder, set_file, "--json").stdout)["worst"]
+    codes = " ".join(map(str, worst["codes"]))
     assert (
-        f"float tables to integers: at most {found['integer_difference']:.3f} steps, {found['integer_worst']:.3f} in "
-        f"the worst possible frame, allowed {found['integer_bound']:g}"
+        f"worst possible frame: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over "
+        f"{worst['competitor']}, allowed {worst['bound']:.3f} ({len(worst['closed'])} switches closed, codes {codes})"
     ) in lines
-    assert f"margin above {found['safe_margin']:g} steps: {found['covered']} rows, of which 0 change class" in lines
-    assert f"largest possible sum, with or without missing inputs: {found['largest_sum']}, allowed 32767" in lines
+    assert (
+        f"margin above {worst['safe_margin']:.3f} steps, which covers the worst frames: "
+        f"{worst['covered']} rows, of which 0 change class"
+    ) in lines
+    assert f"largest possible sum, with or without missing inputs: {worst['reach']}, allowed 32767" in lines
 
 
 def test_a_broken_bound_exits_with_1_and_lists_rows(set_file: Path, build_folder: Path) -> None:

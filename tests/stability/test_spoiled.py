@@ -262,7 +262,7 @@ SPOILED: dict[str, tuple[Callable[[Patch], None], tuple[str, ...]]] = {
     "codes": (lambda patch: patch.setattr(codes, "collapse", later), ("codes on different sides",)),
     "contradictions": (lambda patch: patch.setattr(contradictions, "boost", heavier_row), ("final P",)),
     "weights": (lambda patch: patch.setattr(weights, "boost", heavier_row), ("stumps chosen", "outputs of branches")),
-    "quantisation": (lambda patch: patch.setattr(quantisation, "Scorer", OneTooMuch), ("score most off",)),
+    "quantisation": (lambda patch: patch.setattr(quantisation, "Scorer", OneTooMuch), ("worst frame", "largest loss")),
     "missing": (spoil_missing, ("frames reported as degraded", "outputs that depend on the value of a lost input")),
     "contact": (spoil_contact, ("quasistatic at rest: moment on a joint",)),
     "statistics": (spoil_statistics, ("ends of Wilson's interval", "rates of 0 and 1", "intervals that leave 0 to 1")),

@@ -56,9 +56,16 @@ class Term(ABC):
 
 
 class CoreTerm(Term):
-    """A term of one of the four kinds that boards read: its rows are scores, or whole steps in integer tables."""
+    """A term of one of the four kinds that boards read: its rows are scores, or whole steps in integer tables.
+
+    Attributes
+    ----------
+    stepped : bool
+        Whether the contribution is constant between `steps`.
+    """
 
     __slots__ = ()
+    stepped: ClassVar[bool] = True
 
     def core(self) -> "tuple[CoreTerm, ...]":
         """Return the term."""
@@ -83,6 +90,18 @@ class CoreTerm(Term):
     def largest(self) -> float:
         """The largest absolute contribution to any type."""
         return max(float(np.abs(end).max()) for end in self.ends)
+
+    def parts(self, *values: NDArray[Any]) -> tuple[Rows, NDArray[np.int64]]:
+        """Return rows (n, K), or (1, K), and the whole numbers (n, 1), or (1, 1), by which they count at these values:
+        their products are the contribution, exactly.
+        """
+        return self.of(*values), np.ones((1, 1), np.int64)
+
+    def turning(self, ends: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return codes among which, with these `ends` (m,) of bins, are those of the largest and of the least rounding
+        error in each bin; none where the contribution is stepped.
+        """
+        return ends[:0]
 
     @abstractmethod
     def relative(self) -> Self:

@@ -36,6 +36,7 @@ class Line(CoreTerm):
     """
 
     name = "line"
+    stepped = False
 
     joint: int
     low: int
@@ -106,7 +107,24 @@ class Line(CoreTerm):
 
     def of(self, *values: NDArray[Any]) -> Rows:
         """Return the contribution (n, K) of codes (n,)."""
-        return self.distances(values[0])[:, np.newaxis] * self._wide
+        row, distances = self.parts(*values)
+        return distances * row
+
+    def parts(self, *values: NDArray[Any]) -> tuple[Rows, NDArray[np.int64]]:
+        """Return the row (1, K), and the distances (n, 1) of codes (n,)."""
+        return self._wide[np.newaxis], self.distances(values[0])[:, np.newaxis]
+
+    def turning(self, ends: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return codes about each end; none for scores.
+
+        Between two ends, rounding errors at the first of the codes that share a distance lie on a straight line, and so
+        do those at the last ones: the ends of both lines are among these.
+        """
+        if self.gain is None:
+            return ends[:0]
+        firsts = self.low + (np.clip(ends, self.low, self.high) - self.low) // self.cell * self.cell
+        about = (firsts + near for near in (-1, 0, self.cell - 1, self.cell))
+        return np.concatenate([[self.low, self.high], *about])
 
     def arrays(self) -> Mapping[str, NDArray[Any]]:
         """Return the fields of scores, by name."""

@@ -13,8 +13,10 @@ from thenar.compiler import TRAINERS, GraspSet, Recipe, compile_build
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.compile import MEMBERS
 from thenar.compiler.artifact.documents import REPORT_NAME
+from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.verify import Verification, verify
 from thenar.compiler.glove.propose import propose_harness
+from thenar.compiler.model.collapse import collapse
 from thenar.compiler.scan_file import SCAN_NAME, load_scan, scanmap_to_bytes
 from thenar.compiler.trainers.base import Training
 from thenar.runtime import Build, BuildError
@@ -78,11 +80,22 @@ def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_se
     assert found.covered_changed == 0
 
 
-def test_the_worst_difference_is_told_whether_recorded_or_not(folder: Path, grasp_set: GraspSet) -> None:
-    found, build = verify(folder, grasp_set), Build.load(folder)
-    assert found.integer_difference <= found.integer_worst + 1e-9
-    assert found.integer_worst <= found.integer_bound + 1e-9
-    assert found.largest_sum == build.manifest.proof.bound == build.tables.bound <= 32767
+def test_the_worst_frame_is_told_whether_recorded_or_not(folder: Path, grasp_set: GraspSet) -> None:
+    worst = verify(folder, grasp_set).worst
+    build = Build.load(folder)
+    bits = [switch.name in worst.closed for switch in build.manifest.switches]
+    stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
+    exact = collapse(stumps, len(bits)).scores(np.array([bits]), np.array([worst.codes], np.uint16))[0]
+    leader, competitor = build.grasps.index(worst.leader), build.grasps.index(worst.competitor)
+    deployed = build.scores(bits, np.array(worst.codes, np.uint16))
+    lost = (exact[leader] - exact[competitor]) * build.tables.scale - (deployed[leader] - deployed[competitor])
+    assert lost == pytest.approx(worst.loss, abs=1e-9)
+    assert 0 < worst.loss < worst.bound
+    assert worst.bound == pytest.approx(build.manifest.proof.safe_margin, rel=1e-11, abs=1e-9)
+    assert worst.loss - 1 <= worst.safe_margin <= worst.loss
+    assert worst.covered >= build.manifest.proof.covered
+    assert worst.covered_changed == 0
+    assert abs(worst.reach) == build.manifest.proof.bound == build.tables.bound <= worst.limit == 32767
 
 
 def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_set: GraspSet) -> None:
@@ -95,7 +108,8 @@ def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_se
     _seal(folder, tables.changed(thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))
     found = verify(folder, grasp_set)
     assert found.integer_difference <= found.integer_bound
-    assert found.integer_worst > found.integer_bound
+    assert found.worst.loss > found.worst.bound
+    assert found.worst.codes[0] == 301
     assert not found.holds
 
 

@@ -2,16 +2,17 @@
 
 from collections.abc import Callable
 from fractions import Fraction
-from itertools import product
+from itertools import permutations, product
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.model.compare import compare, float_slack, worst_difference
+from thenar.compiler.model.compare import compare, worst_case
 from thenar.runtime.errors import BuildError
 from thenar.runtime.model.integers import LIMIT, IntegerTables, tables_from_bytes, tables_to_bytes
+from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import as_deployed, balance, quantise
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid
@@ -85,7 +86,9 @@ def test_integers_keep_their_bounds_on_every_row_and_are_read_again(make: Make, 
     exact = exact - exact[:, -1:] if integers.grid > 1 else exact
     for wanted, found in zip(exact.ravel().tolist(), scores[:5].ravel().tolist(), strict=True):
         assert abs(wanted * UNIT * Fraction(integers.scale) - found) <= comparison.integer_bound + comparison.slack
-    assert comparison.integer_difference <= comparison.integer_worst + comparison.slack
+    worst = worst_case(tables, integers, comparison, [*"abcd"], [*"stuv"[: bits.shape[1]]])
+    assert worst.holds
+    assert abs(worst.reach) == integers.bound
     data = tables_to_bytes(integers)
     again = tables_from_bytes(data)
     assert tables_to_bytes(again) == data
@@ -103,20 +106,21 @@ SMALL = {
 @pytest.mark.parametrize("kind", SMALL)
 @settings(deadline=None, max_examples=12)
 @given(seed=seeds, entry_bits=entries)
-@example(seed=7, entry_bits=8)  # the last of the codes that share a distance with the end of a bin is furthest off
-def test_of_all_codes_one_is_off_by_the_worst_difference_and_none_by_more(
-    kind: str, seed: int, entry_bits: int
-) -> None:
+@example(seed=7, entry_bits=8)  # the last of the codes that share a distance with the end of a bin loses most
+def test_of_all_codes_none_loses_more_and_the_witness_as_much(kind: str, seed: int, entry_bits: int) -> None:
     tables, bits, codes = SMALL[kind](seed)
     integers = quantise(tables, bits, codes, entry_bits=entry_bits)
+    rounding = Rounding(tables, integers)
     of_a_joint = range(43) if tables.grids else range(1100)
     frames = list(product((False, True), repeat=bits.shape[1]))
     at = np.array(list(product(of_a_joint, repeat=codes.shape[1])), np.uint16)
     whole = np.repeat(np.array(frames, bool).reshape(len(frames), -1), len(at), axis=0)
     every, parts = lost_in_parts(tables, integers, whole, np.tile(at, (len(frames), 1)))
-    every = every - every[:, -1:] if integers.grid > 1 else every
-    most, slack = Fraction(max(map(abs, every.ravel().tolist())), parts), float_slack(tables, integers.scale)
-    assert abs(worst_difference(as_deployed(tables, integers.grid), integers) - most) <= slack
+    for leader, competitor in permutations(range(integers.n_classes), 2):
+        worst = rounding.worst(leader, competitor)
+        assert worst.loss == Fraction(max(every[:, leader] - every[:, competitor]), parts)
+        own, _ = lost_in_parts(tables, integers, worst.bits[np.newaxis], worst.codes[np.newaxis])
+        assert worst.loss == Fraction(own[0, leader] - own[0, competitor], parts)
 
 
 @given(seed=seeds)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.compare import compare
 from thenar.runtime.model.integers import FINEST_SCALE
+from thenar.runtime.model.proof import Rounding
 from thenar.runtime.model.quantise import (
     Extremes,
     balance,
@@ -59,7 +60,7 @@ def test_the_guarantee_is_the_same_in_coarser_steps(seed: int) -> None:
     assert (found.integer_bound, found.safe_margin) == (5.0, 10.0)
     assert found.holds
     assert not np.isin(found.changed, np.flatnonzero(found.covered)).any()
-    assert found.integer_difference - found.slack <= found.integer_worst <= found.integer_bound + found.slack
+    assert Rounding(tables, integers).worst_of_all().loss <= found.safe_margin + 2 * found.slack
 
 
 def test_tables_of_zeros_and_of_no_joint_stay_so() -> None:

@@ -13,6 +13,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.glove.propose import propose_harness
 from thenar.compiler.hand import HandShape
+from thenar.compiler.model.compare import worst_case
 from thenar.compiler.placement.tree import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.report.content import ReportContent
@@ -93,6 +94,7 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
         scan=made.scan,
         harness=harness,
         comparison=made.comparison,
+        worst=worst_case(made.recogniser.model, made.tables, made.comparison, made.manifest.grasps, names),
     )
 
 
