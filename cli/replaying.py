@@ -49,12 +49,12 @@ def replay_recording(
     Send them to the sinks as the live run did, or as JSON lines to stdout if there are none; on stderr, print how many
     match the recording.
     """
-    from thenar.runtime.live.replay import moments
+    from thenar.runtime.live.replay import replayed
     from thenar.runtime.sinks.jsonl import encode
 
     same = count = 0
     with _published(build, sinks, selector, lambda grasp, shape: encode(grasp, shape, None)) as publish:
-        for then, now in islice(moments(build, replay, policy, warning), frames):
+        for then, now in islice(replayed(build, replay, policy, warning), frames):
             same += then == now.grasp
             count += 1
             publish(now.grasp, now)

@@ -26,7 +26,7 @@ from thenar.runtime.hand import (
 from thenar.runtime.manifest import Calibration, Manifest
 from thenar.runtime.names import fault, nearest, shortened
 from thenar.runtime.toml_source import read_source
-from thenar.runtime.toml_struct import check_finite, convert
+from thenar.runtime.toml_struct import convert
 
 Floats = NDArray[np.float64]
 _LARGEST_DOT_MM, _SMALLEST_DOT_MM = 4.0, 0.5
@@ -175,9 +175,7 @@ def load_layout(path: Path) -> HandShape:
     if path.suffix.lower() != ".toml":
         raise MapError(f"{path.name}: a layout is a .toml file")
     source = read_source(path, MapError)
-    tables = source.tables()
-    check_finite(source, (), tables)
-    layout = convert(source, (), tables, Places)
+    layout = convert(source, (), source.tables(), Places)
     part_of: dict[str, str] = {}
     for part, switches in layout.parts.items():
         for name in switches:

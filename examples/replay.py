@@ -13,7 +13,7 @@ from thenar.runtime.live.replay import replayed
 frames = same = 0
 for then, now in replayed(Build.load(sys.argv[1]), Path(sys.argv[2])):
     frames += 1
-    same += now == then
-    if now != then:
-        print(f"frame {now.number}: {now.grasp}, then {then.grasp}")
+    same += now.grasp == then
+    if now.grasp != then:
+        print(f"frame {then.number}: {now.grasp.grasp}, then {then.grasp}")
 print(f"{same} of {frames} frames recognised as they were recorded")

@@ -108,19 +108,19 @@ class Build:
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
         switches, values = self.scorer.frame(bits, codes)
-        scores = self._all_scores(self.scorer.frame_scores(switches, values), sum(switches), values)
+        scores, _ = self.with_none(self.scorer.frame_scores(switches, values), sum(switches), 0, values)
         return self.classes[scores.index(max(scores))]
 
-    def _all_scores(
-        self, biased_scores: tuple[int, ...], closed: int, codes: Sequence[int], lost: int = 0, lost_joints: Mask = 0
-    ) -> tuple[int, ...]:
-        """Return the scores of all classes, with one for none if the build may refuse the frame: `closed` switches are
-        closed, and `lost` are lost.
+    def with_none(
+        self, biased_scores: tuple[int, ...], closed: int, lost: int, codes: Sequence[int] | None, lost_joints: Mask = 0
+    ) -> tuple[tuple[int, ...], bool]:
+        """Return the scores of all classes, with one for none if the build may refuse a frame, and whether it refuses
+        this one: the arguments are those of `Rejector.refuses`.
         """
         if self.rejector is None:
-            return biased_scores
+            return biased_scores, False
         refused = self.rejector.refuses(biased_scores, closed, lost, codes, lost_joints=lost_joints)
-        return (*biased_scores, max(biased_scores) + self.none_leads[refused])
+        return (*biased_scores, max(biased_scores) + self.none_leads[refused]), refused
 
     def recognise(
         self,
@@ -150,7 +150,7 @@ class Build:
         scorer, degraded = self.scorer, False
         switches, values = scorer.frame(bits, codes)
         if lost_switches is None and lost_joints is None:
-            biased_scores = self._all_scores(scorer.frame_scores(switches, values), sum(switches), values)
+            biased_scores, _ = self.with_none(scorer.frame_scores(switches, values), sum(switches), 0, values)
         else:
             lost = np.zeros(self.tables.n_switches, bool) if lost_switches is None else np.asarray(lost_switches)
             joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else np.asarray(lost_joints)
@@ -158,7 +158,7 @@ class Build:
             degraded = bool(np.any(lost) or np.any(joints))
             closed, gone = int(np.count_nonzero(switches & ~lost.astype(bool))), int(np.count_nonzero(lost))
             mask = sum(1 << joint for joint in np.flatnonzero(joints).tolist())
-            biased_scores = self._all_scores(biased_scores, closed, values, gone, mask)
+            biased_scores, _ = self.with_none(biased_scores, closed, gone, values, mask)
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
         probability = softmax(biased_scores, self.tables.scale)[winner]

@@ -10,8 +10,8 @@ code that a recorded one got.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from operator import getitem, itemgetter
+from collections.abc import Mapping, Sequence
+from operator import getitem
 from typing import TYPE_CHECKING
 
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
@@ -58,7 +58,7 @@ class CodeTables:
     are read several times per record. `lost` are the joints whose bytes in it are 0: nothing was measured.
     """
 
-    __slots__ = ("_last", "_last_codes", "_pick", "_sensors", "_tables", "lost")
+    __slots__ = ("_last", "_last_codes", "_places", "_sensors", "_tables", "lost")
 
     def __init__(self, joints: Sequence[Calibration], sensor_names: Sequence[str], calibration: Meaning = None) -> None:
         """Take the joints in the order of the build's manifest, and the sensors' names in wire order.
@@ -66,8 +66,7 @@ class CodeTables:
         Raises SettingError if the glove lacks a joint, or if its bytes cannot be converted to the build's codes.
         """
         self._sensors = len(sensor_names)
-        places = [place_of(joint.name, sensor_names) for joint in joints]
-        self._pick = _picker(places)
+        self._places = [place_of(joint.name, sensor_names) for joint in joints]
         self._tables = [codes_of_bytes(joint, calibration) for joint in joints]
         self._last: bytes | None = None
         self._last_codes: list[int] = []
@@ -81,11 +80,9 @@ class CodeTables:
             return self._last_codes
         if len(sensors) != self._sensors:
             raise FrameError(f"a CyberGlove record has {len(sensors)} sensors, but {self._sensors} are named")
-        self._last, self._last_codes = sensors, list(map(getitem, self._tables, picked := self._pick(sensors)))
-        whole = all(picked)
-        self.lost = (
-            0 if whole else sum(1 << joint for joint, byte in enumerate(picked[: len(self._tables)]) if not byte)
-        )
+        picked = [sensors[place] for place in self._places]
+        self._last, self._last_codes = sensors, list(map(getitem, self._tables, picked))
+        self.lost = sum(1 << joint for joint, byte in enumerate(picked) if not byte) if 0 in picked else 0
         return self._last_codes
 
 
@@ -144,7 +141,7 @@ class AngleReader:
     `sensor_names` are the record's, in wire order; sensors missing from the calibration are left out.
     """
 
-    __slots__ = ("_names", "_pick", "_tables")
+    __slots__ = ("_names", "_tables")
 
     def __init__(
         self, sensor_names: Sequence[str], calibration: GloveCalibration, read: Sequence[str] | None = None
@@ -157,19 +154,13 @@ class AngleReader:
         if not found:
             raise SettingError("the calibration has none of the glove's sensors: it is for another glove")
         self._names = tuple(sensor.name for _, sensor in found)
-        self._pick = _picker([number for number, _ in found])
-        self._tables = [tuple(math.radians(sensor.value(raw)) for raw in range(_BYTES)) for _, sensor in found]
+        self._tables = [
+            (number, tuple(math.radians(sensor.value(raw)) for raw in range(_BYTES))) for number, sensor in found
+        ]
 
     def angles(self, sensors: bytes) -> JointAngles:
         """Return the angles of one record, whose sensors' bytes are in wire order."""
-        return JointAngles(self._names, tuple(map(getitem, self._tables, self._pick(sensors))))
-
-
-def _picker(places: Sequence[int]) -> Callable[[bytes], tuple[int, ...]]:
-    """Return a function that picks the bytes at these places, then the first again: for a single place itemgetter
-    returns no tuple.
-    """
-    return itemgetter(*places, *places[:1]) if places else lambda _sensors: ()
+        return JointAngles(self._names, tuple([table[sensors[number]] for number, table in self._tables]))
 
 
 def place_of(joint: str, sensor_names: Sequence[str]) -> int:

@@ -98,6 +98,15 @@ class Newest(Generic[F]):
             self.frame, self.time_us, self.expires_us = frame, time_us, time_us + longest_us
 
 
+def bits(mask: Mask) -> list[Mask]:
+    """Return the single bits of `mask`, the lowest first."""
+    found = []
+    while mask:
+        found.append(mask & -mask)
+        mask &= mask - 1
+    return found
+
+
 class BitRemap:
     """Converts a set of a device's bits to a set of switches, as given by `pairs` (bit, switch).
 

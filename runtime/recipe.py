@@ -64,7 +64,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     ] = None
     table_bits: Annotated[
         TableBits,
-        _choice("tables", "Bits per table entry: with 8, steps are coarser."),
+        _choice("tables", "Bits per entry of tables with lines: with 8, entries are multiples of 256 steps."),
     ] = 16
     max_bins: Annotated[
         Annotated[int, Meta(ge=2, le=2**53)] | None, _choice("training", "The most bins of a joint.")

@@ -1,6 +1,7 @@
 """A TOML file with its lines: errors name line and keys. All TOML that thenar reads is read here."""
 
 import codecs
+import math
 import re
 import tomllib
 from collections import Counter
@@ -24,21 +25,17 @@ _LONGEST_REASON = 400
 
 # Nested lists and tables, and parts of a dotted key: the parser recurses at every level, and its time grows with both.
 _DEEPEST = 10
-# Digits of a number: one fewer than the pattern looks for.
+# Digits of a number.
 _LONGEST_NUMBER = 1000
-# Every quantifier is possessive: an unclosed text is scanned once, not tried again from every quote in it.
-_MARKS = re.compile(
-    r"""\#[^\n]*+|\"\"\"(?:[^"\\]++|\\.|"(?!""))*+(?:\"\"\")?+|'''(?:[^']++|'(?!''))*+(?:''')?+
-    |"(?:[^"\\\n]++|\\.)*+"?+|'[^'\n]*+'?+|(?P<mark>[][{}=,.\n])|(?P<long>(?<![\w+-])[\w+-]{1001})""",
-    re.VERBOSE | re.DOTALL,
-)
 
 # A place in a file: keys, and list indices from 0.
 Place = tuple[str | int, ...]
 
+# Every quantifier is possessive: an unclosed text is scanned once, not tried again from every quote in it.
 _TOKEN = re.compile(
-    r"""(?P<blank>[ \t\r]+|\#[^\n]*)|(?P<newline>\n)|(?P<mark>[][{}=,.])
-    |(?P<text>\"\"\"(?:\\.|[^\\])*?\"{3,5}|'''.*?'{3,5}|"(?:\\.|[^"\\])*"|'[^']*')|(?P<word>[^][\s{}=,."'\#]+)""",
+    r"""(?P<blank>[ \t\r]++|\#[^\n]*+)|(?P<mark>[][{}=,.\n])|(?P<word>[^][\s{}=,."'\#]++)
+    |\"\"\"(?:[^"\\]++|\\.|"(?!""))*+(?:\"{3,5})?+|'''(?:[^']++|'(?!''))*+(?:'{3,5})?+
+    |"(?:[^"\\\n]++|\\.)*+"?+|'[^'\n]*+'?+""",
     re.VERBOSE | re.DOTALL,
 )
 
@@ -51,14 +48,25 @@ class TomlText(Struct, frozen=True):
     raises: type[ThenarError]
 
     def tables(self) -> dict[str, object]:
-        """Return the content of the file; raises its error, with the line, if it is not TOML or exceeds a limit."""
+        """Return the content of the file; raises its error, with the line, if it is not TOML, exceeds a limit, or has a
+        number that is not finite.
+        """
         if len(self.text) > LARGEST:
             raise self.raises(f"{self.name} is longer than {LARGEST} characters, the limit for TOML: shorten it")
         try:
             _check_nesting(self.text)
-            return tomllib.loads(self.text)
+            tables = tomllib.loads(self.text)
         except ValueError as reason:
             raise self.raises(f"{self.name} is not valid TOML: {shortened(str(reason), _LONGEST_REASON)}") from reason
+        self._check_finite((), tables)
+        return tables
+
+    def _check_finite(self, place: Place, value: object) -> None:
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self.error(place, f"must be a finite number, not {value}")
+        inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+        for key, item in inside:
+            self._check_finite((*place, key), item)
 
     def error(self, place: Place, reason: str) -> ThenarError:
         """Return an error about the entry at `place`: "scene.toml, line 7: subjects[0].name: ..."."""
@@ -88,14 +96,14 @@ def read_source(file: "Traversable", raises: type[ThenarError]) -> TomlText:
 def _check_nesting(text: str) -> None:
     """Raise ValueError for what would take the parser minutes: deep nesting, or a long number."""
     depth = dots = 0
-    for found in _MARKS.finditer(text):
-        mark = found["mark"]
+    for found in _TOKEN.finditer(text):
+        mark, word = found["mark"], found["word"]
         if mark == ".":
             dots += 1
         elif mark is not None:
             dots = 0
             depth += (mark in "[{") - (mark in "]}")
-        elif found["long"] is not None:
+        elif word is not None and len(word) > _LONGEST_NUMBER:
             raise ValueError(f"a key or a number is longer than {_LONGEST_NUMBER} digits")
         if depth > _DEEPEST or dots > _DEEPEST:
             raise ValueError(f"lists, tables or dotted keys nest deeper than {_DEEPEST} levels")
@@ -107,7 +115,7 @@ def spelled(place: Place) -> str:
 
 
 def _tokens(text: str) -> Iterator[tuple[str, int]]:
-    """Yield the pieces of valid TOML that are not blank, with their lines."""
+    """Yield the pieces of TOML that are not blank, with their lines."""
     line = 1
     for found in _TOKEN.finditer(text):
         if found.lastgroup != "blank":

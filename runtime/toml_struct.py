@@ -3,19 +3,20 @@
 All errors raised here are those of the source that is read.
 """
 
-import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TypeVar
 
 import msgspec
 from msgspec import inspect
 
 from .errors import ThenarError
-from .names import list_names, nearest, shortened
-from .toml_source import Place, TomlText
+from .names import fault, list_names, nearest, shortened
+from .toml_source import Place, TomlText, spelled
 
 S = TypeVar("S", bound=msgspec.Struct)
+# Its place in a file, and what is wrong.
+Fault = tuple[Place, str]
 
 _TYPES = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "array": "a list"}
 _TYPES |= {"object": "a table"}
@@ -56,13 +57,15 @@ def check_keys(source: TomlText, place: Place, table: Mapping[str, object], know
             raise source.error((*place, key), _advice(key, known))
 
 
-def check_finite(source: TomlText, place: Place, value: object) -> None:
-    """Raise the error of the first number in `value`, or inside it, that is not finite."""
-    if isinstance(value, float) and not math.isfinite(value):
-        raise source.error(place, f"must be a finite number, not {value}")
-    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, item in inside:
-        check_finite(source, (*place, key), item)
+def wrong_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:
+    """Yield names of a `what` that are invalid or used twice."""
+    seen: dict[str, Place] = {}
+    for place, name in named:
+        if reason := fault(name):
+            yield place, f"{shortened(repr(name))} is not a valid name of a {what}: it {reason}"
+        if name in seen:
+            yield place, f"{what} {name!r} is already {spelled(seen[name])}: use the name in one place"
+        seen[name] = place
 
 
 def _advice(key: str, known: Collection[str]) -> str:

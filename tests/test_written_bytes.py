@@ -44,11 +44,11 @@ def kept(name: str, written: dict[str, str], update: bool) -> None:
 
 
 def builds_of(grasps: Path, glove: Path, folder: Path) -> dict[str, str]:
-    """Compile `grasps` with sums of 16 bits and a wiring, and with tables of 8 bits; return the digest of each file."""
+    """Compile `grasps` with sums of 16 bits and a wiring, and lines of 8 bits; return the digest of each file."""
     whole, small = folder / "whole", folder / "small"
-    common = ["compile", str(grasps), "--folds", "0", "--no-report", "--rounds", "10"]
-    assert run([*common, "-o", str(whole), "--glove", str(glove)]) == 0
-    assert run([*common, "-o", str(small), "--table-bits", "8", "--max-bins", "8"]) == 0
+    common = ["compile", str(grasps), "--folds", "0", "--no-report"]
+    assert run([*common, "-o", str(whole), "--glove", str(glove), "--rounds", "10"]) == 0
+    assert run([*common, "-o", str(small), "--trainer", "linear", "--table-bits", "8"]) == 0
     return {"set.grasps": hashlib.sha256(grasps.read_bytes()).hexdigest()} | {
         f"{build.name}/{name}": digest for build in (whole, small) for name, digest in digests(build)
     }

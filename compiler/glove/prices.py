@@ -16,7 +16,7 @@ from msgspec import Meta, Struct
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.toml_source import read_source
-from thenar.runtime.toml_struct import check_finite, convert
+from thenar.runtime.toml_struct import convert
 
 
 class Part(Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,9 +42,7 @@ def load_prices(path: Path, names: Sequence[str]) -> dict[str, Part]:
     Raises SettingError, with the line, for a file that is no price list, and for a sensor without a part.
     """
     source = read_source(path, SettingError)
-    tables = source.tables()
-    check_finite(source, (), tables)
-    parts = convert(source, (), tables, PriceList).part
+    parts = convert(source, (), source.tables(), PriceList).part
     found = {
         name: next((part for part in parts if any(fnmatchcase(name, each) for each in part.sensors)), None)
         for name in names

@@ -14,9 +14,9 @@ from thenar.drivers.transports import OTHER_PORTS, line_port_fault
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
+from ..toml_struct import Fault, wrong_names
 from .wiring import SLOWEST_HZ, BoardWiring, BusWiring, ChipWiring, GloveWiring, Harness, SpiWiring, StreamWiring
 
-Fault = tuple[Place, str]
 _SENSORS = (18, 22)
 _THRESHOLD = StreamWiring(port="-").threshold
 # As sketches name them: a number, or a macro of the board's core.
@@ -48,7 +48,7 @@ def _of_glove(glove: GloveWiring) -> Iterator[Fault]:
         wanted = " or ".join(map(str, counts))
         yield ("cyberglove", "joints"), f"{len(glove.joints)} names for {wanted} sensors: name every one, in wire order"
     named = ((("cyberglove", "joints", n), name) for n, name in enumerate(glove.joints) if name)
-    yield from _of_names(named, "sensor")
+    yield from wrong_names(named, "sensor")
 
 
 def _of_devices(harness: Harness) -> Iterator[Fault]:
@@ -124,7 +124,9 @@ def _of_stream(place: Place, stream: StreamWiring) -> Iterator[Fault]:
     if stream.board is not None:
         yield from _of_board((*place, "board"), stream, stream.board)
     columns = ((*place, "columns", number) for number in range(len(stream.columns)))
-    yield from _of_names(((where, name) for where, name in zip(columns, stream.columns, strict=True) if name), "column")
+    yield from wrong_names(
+        ((where, name) for where, name in zip(columns, stream.columns, strict=True) if name), "column"
+    )
 
 
 def _of_frame(place: Place, stream: StreamWiring, pattern: str) -> Iterator[Fault]:
@@ -161,7 +163,7 @@ def _of_board(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterato
             if name not in known:
                 yield where, f"the stream has no such column {shortened(repr(name))}{nearest(name, known)}"
     yield from _of_board_pins(place, stream, board)
-    yield from _of_names([*pins, *switches], "input")
+    yield from wrong_names([*pins, *switches], "input")
 
 
 def _of_board_pins(place: Place, stream: StreamWiring, board: BoardWiring) -> Iterator[Fault]:
@@ -255,15 +257,4 @@ def _of_elements(harness: Harness) -> Iterator[Fault]:
         for here, chip in chips:
             yield from (((*here, "pins", pin), name) for pin, name in chip.pins.items())
 
-    yield from _of_names(wired(), "switch or taxel" if harness.taxel_names else "switch")
-
-
-def _of_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:
-    """Yield names that are invalid or used twice."""
-    seen: dict[str, Place] = {}
-    for place, name in named:
-        if reason := fault(name):
-            yield place, f"{shortened(repr(name))} is not a valid name of a {what}: it {reason}"
-        if name in seen:
-            yield place, f"{what} {name!r} is already {spelled(seen[name])}: wire it in one place"
-        seen[name] = place
+    yield from wrong_names(wired(), "switch or taxel" if harness.taxel_names else "switch")

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from ..errors import HarnessError
 from ..names import sound_name
 from ..toml_source import TomlText, read_source
-from ..toml_struct import check_finite, convert
+from ..toml_struct import convert
 from .checks import faults
 from .wiring import Harness
 
@@ -30,9 +30,7 @@ def parse_harness(text: str, name: str) -> Harness:
 
 
 def _harness_of(source: TomlText, name: str) -> Harness:
-    tables = source.tables()
-    check_finite(source, (), tables)
-    harness = convert(source, (), {"name": sound_name(name, "glove")} | tables, Harness)
+    harness = convert(source, (), {"name": sound_name(name, "glove")} | source.tables(), Harness)
     for place, reason in faults(harness):
         raise source.error(place, reason)
     return harness

@@ -6,9 +6,7 @@ from ..scores import softmax
 
 
 class Ranking:
-    """The K scores of a frame (2^15 too high). A build that refuses frames has K + 1 (`with_none_class`): none is
-    the last class.
-    """
+    """The K scores of a frame (2^15 too high); K + 1 if the build refuses frames (`Build.with_none`)."""
 
     __slots__ = ("_margin", "_shares", "biased_scores", "candidate")
 
@@ -38,10 +36,6 @@ class Ranking:
         if self._shares[0] != scale:
             self._shares = scale, softmax(self.biased_scores, scale)
         return self._shares[1][number]
-
-    def with_none_class(self, lead: int) -> "Ranking":
-        """Return the same with none, the last class, `lead` steps above the best, or below it if that is negative."""
-        return Ranking((*self.biased_scores, max(self.biased_scores) + lead))
 
 
 class Decision(Struct):

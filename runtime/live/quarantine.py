@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..build import Build
-from ..frames import Mask, SwitchFrame
+from ..frames import Mask, SwitchFrame, bits
 from ..published import Quarantined
 
 # Time for which contacts must stay the same before a grasp is evaluated.
@@ -49,8 +49,6 @@ GRASPS = 1_000
 # Evidence is counted in sixteenths of a nat.
 _NAT = 16
 _SLIPS, _LEAST, _LEAST_ALONE = 1 / 32, 1 / 20, 1 / 100
-# Sets of lost inputs for which the choice of switches to leave out is kept.
-_KEPT = 64
 # A switch begins with one grasp in which it closed as expected and one in which it did not (Laplace's rule).
 _DOUBT = 255
 
@@ -182,8 +180,10 @@ class Quarantine:
         self._stuck = StuckTest(build) if switches and switches[0].closed_least else None
         self._chattering = Chattering(len(switches))
         self._wrong: dict[int, str] = {}
-        self._chosen: dict[tuple[Mask, Mask], tuple[Mask, tuple[Quarantined, ...]]] = {}
         self.found: tuple[Quarantined, ...] = ()
+        # The switches left out, and the lost inputs for which they were chosen: those seldom change.
+        self._chosen: Mask = 0
+        self._chosen_for: tuple[Mask, Mask] | None = None
         self._seen_us = self._since_us = -1
         # The last known state of the switches, the contacts of the grasp, and the switches read as it began.
         self._shown: Mask = 0
@@ -200,14 +200,12 @@ class Quarantine:
         """Return the switches to leave out, when these and these joints are lost as well: in the order of detection, as
         long as the result does not become unknown because of them.
         """
-        if (chosen := self._chosen.get((lost, joints_lost))) is None:
-            chosen = self._chosen[lost, joints_lost] = self._choose(lost, joints_lost)
-        out, self.found = chosen
-        return out
+        if (lost, joints_lost) != self._chosen_for:
+            self._chosen_for = lost, joints_lost
+            self._chosen, self.found = self._choose(lost, joints_lost)
+        return self._chosen
 
     def _choose(self, lost: Mask, joints_lost: Mask) -> tuple[Mask, tuple[Quarantined, ...]]:
-        if len(self._chosen) >= _KEPT:
-            self._chosen.clear()
         out, found = 0, list[Quarantined]()
         # If too much is lost anyway, using any of them would not help.
         unknown = not self._fits(lost, joints_lost)
@@ -258,7 +256,7 @@ class Quarantine:
         now |= dict.fromkeys(numbers(self._chattering.switches), CHATTERING)
         if now != self._wrong:
             self._wrong = {which: now[which] for which in (*(each for each in self._wrong if each in now), *now)}
-            self._chosen.clear()
+            self._chosen_for = None
 
 
 def _differ(contacts: Mask, others: Mask) -> bool:
@@ -273,8 +271,4 @@ def _flags(mask: Mask, bits: int) -> Flags:
 
 def numbers(mask: Mask) -> list[int]:
     """Return the numbers of the bits of `mask`."""
-    found = []
-    while mask:
-        found.append((mask & -mask).bit_length() - 1)
-        mask &= mask - 1
-    return found
+    return [bit.bit_length() - 1 for bit in bits(mask)]

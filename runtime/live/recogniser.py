@@ -66,7 +66,7 @@ class LiveRecognizer:
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
-        self._policy, self._grasps = policy or Policy(), build.manifest.classes
+        self._build, self._policy, self._grasps = build, policy or Policy(), build.classes
         tables = build.tables
         self._scale, self._all_switches = tables.scale, (1 << tables.n_switches) - 1
         self._reads_switches = switch_period_us is not None and tables.n_switches > 0
@@ -74,7 +74,6 @@ class LiveRecognizer:
         self._switches = Newest[SwitchFrame]()
         grace_us = self._policy.grace_of(glove_period_us or 0)
         self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us, grace_us)
-        self._scorer = build.scorer
         # Closed and lost switches, codes, and lost joints: a hand at rest is scored and ranked once.
         self._state: tuple[Mask, Mask, Sequence[int] | None, Mask] | None = None
         self._missing = MissingInputs(build, self._policy.max_lost)
@@ -84,7 +83,6 @@ class LiveRecognizer:
         self._decider = Decision(self._lead, self._policy.dwell_us, self._policy.hold_us)
         lag_us, model = self._policy.lag_us, build.manifest.segmenting
         self._segments = None if lag_us is None else LiveSegments(model, build.grasps, lag_us)
-        self._rejector, self._none_leads = build.rejector, build.none_leads
         self._number = 0
 
     def _trusted(self, frame: SwitchFrame | None, joints_lost: Mask) -> SwitchFrame | None:
@@ -108,9 +106,10 @@ class LiveRecognizer:
         lost_joints = self._joints.lost if codes else 0
         closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
         if (state := (closed, lost, codes, lost_joints)) != self._state:
-            self._biased_scores = self._scorer.state_scores(*state)
-            self._ranking, self._refused = self._ranked(self._biased_scores, *state)
-            self._state = state
+            self._biased_scores = self._build.scorer.state_scores(*state)
+            counts = closed.bit_count(), lost.bit_count()
+            ranked, self._refused = self._build.with_none(self._biased_scores, *counts, codes, lost_joints)
+            self._ranking, self._state = Ranking(ranked), state
         biased_scores, standing, refused = self._biased_scores, self._ranking, self._refused
         missing, too_much = self._missing.of(lost, lost_joints | joints_lost)
         if read is not None:
@@ -126,17 +125,6 @@ class LiveRecognizer:
         grasp = self._published(now_us, unix_us, standing, missing, too_much, decided, seen_us, segment, late)
         self._number += 1
         return Moment(grasp, switches, glove, codes, scores=scores, refused=refused)
-
-    def _ranked(
-        self, biased_scores: tuple[int, ...], closed: Mask, lost: Mask, codes: Sequence[int] | None, lost_joints: Mask
-    ) -> tuple[Ranking, bool]:
-        """Return the ranking of a frame's classes, and whether the build refuses it."""
-        ranking = Ranking(biased_scores)
-        if self._rejector is None:
-            return ranking, False
-        counts = closed.bit_count(), lost.bit_count()
-        refused = self._rejector.refuses(biased_scores, *counts, codes, lost_joints=lost_joints)
-        return ranking.with_none_class(self._none_leads[refused]), refused
 
     def _published(
         self,

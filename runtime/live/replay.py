@@ -27,22 +27,14 @@ _USUALLY = 0.95
 
 def replayed(
     build: Build, recording: Path, policy: Policy | None = None, warn: Callable[[str], None] = lambda _: None
-) -> Iterator[tuple[LiveGrasp, LiveGrasp]]:
-    """Yield the recorded and the new prediction, moment by moment, decided as before or by another `policy`.
+) -> Iterator[tuple[LiveGrasp, Moment]]:
+    """Yield the recorded prediction and the new moment, one by one, decided as before or by another `policy`.
 
     The newest frames at each moment are those that precede it in the recording, as the live loop wrote them. At the end
     `warn` takes a sentence on each fault of the file.
 
     Raises FormatError if it is not a recording, SettingError if it is from another build.
     """
-    for entry, moment in moments(build, recording, policy, warn):
-        yield entry, moment.grasp
-
-
-def moments(
-    build: Build, recording: Path, policy: Policy | None = None, warn: Callable[[str], None] = lambda _: None
-) -> Iterator[tuple[LiveGrasp, Moment]]:
-    """Yield the recorded prediction and the complete new moment; see `replayed`."""
     reader = Reader(recording)
     if reader.session.build != build.manifest.checksum:
         raise SettingError(

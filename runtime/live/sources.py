@@ -327,15 +327,11 @@ class Sources:
         """The number of frames that arrived and were not taken in time; a recording lacks them."""
         return self._arrivals.overflowed
 
-    @property
-    def failure(self) -> SettingError | None:
-        """Why a device can never work as configured in glove.toml; None: each may."""
-        return next((keeper.failure for keeper in self._keepers if keeper.failure is not None), None)
-
     def raise_settings(self) -> None:
         """Raise the SettingError of a device that can never work as configured in glove.toml."""
-        if self.failure is not None:
-            raise self.failure
+        for keeper in self._keepers:
+            if keeper.failure is not None:
+                raise keeper.failure
 
     def __enter__(self) -> Self:
         for keeper in self._keepers:

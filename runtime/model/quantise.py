@@ -4,16 +4,12 @@ Rounding every row to whole steps moves a score by at most (inputs + 1)/2 steps,
 input's row. Two scores can therefore approach each other by at most inputs + 1 steps, and a frame whose best score
 leads by more than that keeps its grasp type. This holds for every scale: a coarser one only makes a step worth more.
 
-Firmware adds the results of table lookups: the sum of the rows of a few switches, or a row of a joint. Where it stores
-these in entries of 8 bits, as the excess over the minimum for the lookup and class, no lookup may span more than 255
-steps. The scale is then about 4 steps per unit of score, compared with about 300 for 16 bits.
-
-The row of a line becomes whole steps per distance from the middle of its range (terms/line.py), a byte each. This
-moves a score by at most half a step times the largest distance, which is at most 127. Where tables have lines and
-entries of 8 bits, the entries are the upper halves of steps: rows of switches and bins are rounded to multiples of 256
-steps, and only lines and bias use the full resolution of 16-bit sums. The bias compensates the mean rounding error: x
-times the error of a switch's row becomes (x - mean) times the error, which is no larger for x = 0 or 1. Such scores are
-relative to the last class, so there is one class less to add up.
+The row of a line becomes whole steps per distance from the middle of its range (terms/line.py), a byte each. This moves
+a score by at most half a step times the largest distance, which is at most 127. Where tables have lines, entries may
+have 8 bits, the upper halves of steps, which straight-line code adds in one instruction: rows of switches and bins are
+rounded to multiples of 256 steps, and only lines and bias use the full resolution of 16-bit sums. The bias compensates
+the mean rounding error: x times the error of a switch's row becomes (x - mean) times the error, which is no larger for
+x = 0 or 1. Such scores are relative to the last class, so there is one class less to add up.
 """
 
 import math
@@ -27,10 +23,6 @@ from .integers import COARSE, FINEST_SCALE, IntegerTables
 from .tables import ScoreTables
 from .terms.base import Floats, rounded
 from .terms.line import LARGEST_SLOPE, WIDEST, Line
-
-# The most consecutive switches that firmware looks up together in tables of narrow entries. Every group of this many
-# consecutive switches keeps the span, so smaller groups do as well.
-GROUP_SIZE = 5
 
 
 def balance(tables: ScoreTables) -> ScoreTables:
@@ -71,22 +63,21 @@ def _centred(tables: ScoreTables, scale: float) -> ScoreTables:
     return tables.changed(joint_rows=rows) if tables.lines else tables
 
 
-def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) -> float:
-    """Return the largest scale at which no sum exceeds `limit` and no lookup spans more than `widest`.
+def finest_scale(tables: ScoreTables, limit: float, grid: int = 1) -> float:
+    """Return the largest scale at which no sum exceeds `limit`.
 
     It is a double below FINEST_SCALE; 1 for tables of zeros. Rounded terms never shrink as the scale grows, so neither
-    do sums and spans, and bisection over the doubles is exact. With lines, or rows on a `grid`, the result is only one
-    of the largest.
+    do sums, and bisection over the doubles is exact. With lines, or rows on a `grid`, the result is only one of the
+    largest.
     """
     extremes = Extremes(tables, grid)
     whole = extremes.reach(1.0, whole=False)
     if whole == 0:
         return 1.0
     most = limit + grid * (len(tables.terms) - len(tables.lines) + 2) + WIDEST * len(tables.lines)
-    unbound = grid > 1 or widest >= 2 * limit  # a lookup is a part of some sum
     fits, too_fine = 0.0, min(most / whole, FINEST_SCALE)
     while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
-        if extremes.reach(middle) <= limit and (unbound or extremes.span(middle) <= widest):
+        if extremes.reach(middle) <= limit:
             fits = middle
         else:
             too_fine = middle
@@ -104,54 +95,28 @@ class Extremes:
     def __init__(self, tables: ScoreTables, grid: int = 1) -> None:
         fixed = [term for term in tables.core_terms if not isinstance(term, Line)]
         ends = [(tables.bias, tables.bias), *(term.ends for term in fixed)]
-        self._n_switches, self._lines = tables.n_switches, tables.lines
+        self._lines = tables.lines
         self._upper, self._lower = (np.stack(rows) for rows in zip(*ends, strict=True))
         # Where the bins of each joint begin, and the grid of each row.
         self._first = 1 + tables.n_switches
         self._grids = np.array([1.0] + [2 * term.rounding_error(1.0, grid) for term in fixed])[:, np.newaxis]
 
-    def _at(self, scale: float, *, whole: bool) -> tuple[Floats, Floats]:
-        """Return the largest and smallest scaled rows, zero included, (1 + terms, K) each: bias, switches, joints at
-        the zeros of their lines, and grids.
-        """
-        upper, lower = self._upper, self._lower
-        if self._lines:
-            upper, lower = upper.copy(), lower.copy()
-            for line in self._lines:
-                offset = line.offset(scale)
-                upper[self._first + line.joint] += offset
-                lower[self._first + line.joint] += offset
-        upper, lower = upper * scale, lower * scale
-        if whole:
-            upper, lower = np.rint(upper / self._grids) * self._grids, np.rint(lower / self._grids) * self._grids
-        return np.maximum(upper, 0), np.minimum(lower, 0)
-
     def reach(self, scale: float, *, whole: bool = True) -> float:
         """Return the largest absolute value of a partial sum of the scaled rows, in any order; infinity if an entry of
         a slope's row does not fit its byte.
         """
-        upper, lower = self._at(scale, whole=whole)
         slopes = [line.whole(scale, 1) if whole else line.slope(scale) for line in self._lines]
         if whole and any(np.abs(slope.row).max() > LARGEST_SLOPE for slope in slopes):
             return math.inf
-        for slope in slopes:
-            largest, smallest = slope.ends
-            upper, lower = np.vstack([upper, largest]), np.vstack([lower, smallest])
-        return float(max(upper.sum(axis=0).max(), -lower.sum(axis=0).min()))
-
-    def span(self, scale: float) -> float:
-        """Return the largest difference between results of one lookup for a class.
-
-        A lookup returns a joint's row or zero, scaled and rounded, or the sum of the rows of some of GROUP_SIZE
-        consecutive switches. Zero, which `balance` puts between a joint's rows anyway, is included so that no span
-        shrinks as the scale grows.
-        """
-        upper, lower = self._at(scale, whole=True)
-        switches, others = np.split(upper[1:] - lower[1:], [self._n_switches])
-        # Sums of integers are exact, and so is the difference of two of them, GROUP_SIZE switches apart.
-        sums = np.cumsum(np.vstack([np.zeros((GROUP_SIZE, upper.shape[1])), switches]), axis=0)
-        groups = sums[GROUP_SIZE:] - sums[:-GROUP_SIZE]
-        return float(np.vstack([groups, others]).max(initial=0.0))
+        # Bins count at the zeros of their joint's line.
+        offsets = np.zeros_like(self._upper)
+        for line in self._lines:
+            offsets[self._first + line.joint] = line.offset(scale)
+        rows = [(self._upper + offsets) * scale, (self._lower + offsets) * scale]
+        if whole:
+            rows = [np.rint(each / self._grids) * self._grids for each in rows]
+        upper, lower = (np.vstack(ends) for ends in zip(rows, *(slope.ends for slope in slopes), strict=True))
+        return float(max(np.maximum(upper, 0).sum(axis=0).max(), -np.minimum(lower, 0).sum(axis=0).min()))
 
 
 def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
@@ -174,16 +139,14 @@ def quantise(
 ) -> IntegerTables:
     """Return integer tables whose sums fit `width` bits (4 to 16), rounded half to even.
 
-    bits (n, s) and codes (n, j) are the training rows; their mean contributions replace missing inputs. No lookup (a
-    joint, or up to GROUP_SIZE consecutive switches) spans more than 2^entry_bits - 1 steps in any class. With 16 bits
-    this is no restriction, since sums of 16 bits span no more. With lines, entries of fewer than 16 bits are multiples
-    of 256 instead.
+    bits (n, s) and codes (n, j) are the training rows; their mean contributions replace missing inputs. Where tables
+    have lines, entries of fewer than 16 bits are multiples of 256 steps.
     """
     grid, means = COARSE if tables.lines and entry_bits < 16 else 1, bits.sum(axis=0) / len(bits)
     balanced = balance(as_deployed(tables, grid))
     limit, room = 2 ** (width - 1) - 1, 0.0
     while True:
-        scale = finest_scale(balanced, limit - room, 2**entry_bits - 1, grid)
+        scale = finest_scale(balanced, limit - room, grid)
         bias = _whole_bias(balanced, scale, grid, means)
         beyond = Extremes(ScoreTables(bias / scale, balanced.terms), grid).reach(scale) - limit
         if grid == 1 or beyond <= 0:

@@ -31,7 +31,7 @@ from thenar.drivers.errors import SettingError
 from ..names import fault, nearest, shortened
 from ..published import NONE, UNKNOWN, LiveGrasp, Preshape
 from ..toml_source import Place, read_source
-from ..toml_struct import check_finite, convert
+from ..toml_struct import Fault, convert, wrong_names
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -136,7 +136,6 @@ SHIPPED = ("barrett_bh8", "parallel_gripper")
 _TO_SI = {"deg": math.pi / 180, "rad": 1.0, "mm": 0.001, "m": 1.0}
 
 _Name = Annotated[str, Meta(min_length=1)]
-Fault = tuple[Place, str]
 
 
 class _Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -164,9 +163,7 @@ def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
     Raises SettingError naming the file, its line and the key.
     """
     source = read_source(_find(name), SettingError)
-    tables = source.tables()
-    check_finite(source, (), tables)
-    content = convert(source, (), tables, _File)
+    content = convert(source, (), source.tables(), _File)
     for place, reason in _faults(content):
         raise source.error(place, reason)
     names, factors = tuple(joint.name for joint in content.joints), [_TO_SI[joint.unit] for joint in content.joints]
@@ -211,7 +208,12 @@ def _faults(content: _File) -> Iterator[Fault]:
     """Yield the places and reasons of what is wrong beyond the types of fields; the first one counts."""
     if not content.joints:
         yield ("joints",), "must name at least one joint"
-    yield from _of_names(content)
+    joints, preshapes = (
+        [((table, number, "name"), one.name) for number, one in enumerate(getattr(content, table))]
+        for table in ("joints", "preshapes")
+    )
+    yield from wrong_names(joints, "joint")
+    yield from wrong_names(preshapes, "preshape")
     for number, joint in enumerate(content.joints):
         if joint.range[0] > joint.range[1]:
             yield ("joints", number, "range"), "must be the lowest and then the highest position"
@@ -228,20 +230,6 @@ def _faults(content: _File) -> Iterator[Fault]:
             grasps[grasp] = entry.name
     if not grasps:
         yield ("preshapes",), "must name at least one grasp type"
-
-
-def _of_names(content: _File) -> Iterator[Fault]:
-    named: list[tuple[str, str, int, str]] = [
-        *(("joint", "joints", number, joint.name) for number, joint in enumerate(content.joints)),
-        *(("preshape", "preshapes", number, entry.name) for number, entry in enumerate(content.preshapes)),
-    ]
-    seen = set[tuple[str, str]]()
-    for kind, table, number, name in named:
-        if reason := fault(name):
-            yield (table, number, "name"), f"{shortened(repr(name))} {reason}"
-        if (kind, name) in seen:
-            yield (table, number, "name"), f"{kind} {name!r} is named twice"
-        seen.add((kind, name))
 
 
 def _of_positions(place: Place, entry: _Entry, joints: tuple[_Joint, ...]) -> Iterator[Fault]:

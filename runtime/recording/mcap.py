@@ -114,24 +114,11 @@ def _cut(content: bytes, at: int, length: int) -> tuple[bytes, int]:
     return content[at : at + length], at + length
 
 
-_READ = frozenset(
-    {
-        Opcode.HEADER,
-        Opcode.SCHEMA,
-        Opcode.CHANNEL,
-        Opcode.MESSAGE,
-        Opcode.METADATA,
-        Opcode.DATA_END,
-        Opcode.FOOTER,
-    }
-)
-
-
 @dataclass(frozen=True, slots=True)
 class RawRecord:
     """A whole record: its place and its content.
 
-    content        None if it is of no use here, or too long
+    content        None if it is too long
     before, after  CRC-32 of all bytes from the beginning of its section to its own beginning, and to its end
     """
 
@@ -197,16 +184,16 @@ class RecordStream:
         opcode, length = _OPENING.unpack(opening)
         before = self._crc
         self._crc = crc32(opening, before)
-        content = self._content(file, opcode, length)
+        content = self._content(file, length)
         end = offset + _OPENING.size + length
         if file.tell() != end:
             self.end = End(False, offset, self.size, "the file became shorter while it was read")
             return None
         return RawRecord(offset, opcode, content, end, before, self._crc)
 
-    def _content(self, file: BinaryIO, opcode: int, length: int) -> bytes | None:
-        """Return the next `length` bytes, or nothing for a record that is skipped. Its bytes count all the same."""
-        if opcode in _READ and length <= LARGEST_RECORD:
+    def _content(self, file: BinaryIO, length: int) -> bytes | None:
+        """Return the next `length` bytes, or nothing if they are too many. These count all the same."""
+        if length <= LARGEST_RECORD:
             content = file.read(length)
             self._crc = crc32(content, self._crc)
             return content

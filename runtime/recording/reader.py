@@ -29,6 +29,8 @@ _LEAST, _LARGEST = -(2**63), 2**63 - 1
 _REASON = 200
 # The most records of a file that are no messages: a recording has a few dozen.
 OTHER_RECORDS = 100_000
+# The records that describe others, which a recording has.
+_DESCRIBING = (Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA)
 # All of a footer except its checksum, which covers the rest.
 _CHECKED_FOOTER = 16
 # Maximum memory for a recording beyond its own size, in bytes.
@@ -133,15 +135,15 @@ class Reader:
                 "is a chunk, which thenar's recordings do not have: another program packed them; read the original, or "
                 "save other programs' data as CSV"
             )
-        if content is None:
-            self.foreign = True
-            self._skip(kind_of(record.opcode), record.offset)
-        elif record.opcode == Opcode.MESSAGE:
+        if content is not None and record.opcode == Opcode.MESSAGE:
             entry = self._message(content)
             if entry is not None:
                 yield entry
-        else:
+        elif content is not None and record.opcode in _DESCRIBING:
             yield from self._described(record, content)
+        else:
+            self.foreign = True
+            self._skip(kind_of(record.opcode), record.offset)
 
     def _skip(self, what: str, offset: int) -> None:
         self._skipped += 1
@@ -166,7 +168,7 @@ class Reader:
             yield from self._sessions(record, *self._parsed(Opcode.METADATA, record, content))
         elif record.opcode == Opcode.CHANNEL:
             self._name(*self._parsed(Opcode.CHANNEL, record, content))
-        elif record.opcode == Opcode.SCHEMA:
+        else:
             number, name, *_ = self._parsed(Opcode.SCHEMA, record, content)
             self._schemas[number] = name
 

@@ -86,11 +86,10 @@ class Decoder:
         # A cost that every state pays at every tick changes no comparison.
         usual = max(model.stay, key=model.stay.count)
         self._stay = [cost - usual for cost in model.stay]
-        self._stays = any(self._stay[:K])
         self._sums, self._best, self._starts = [0] * (K + 1), [0] * (K + 1), [0] * (K + 1)
         # For each of the last ticks, b of all states and the beginnings that belong to it.
         self._past = deque([(self._best, self._starts)] * max(model.least), max(model.least))
-        self._least, self._alike = model.least, len({*model.least[:K]}) == 1
+        self._least = model.least
         self._costs = (_NEVER, _NEVER, _NEVER)
         self._next = _Sources((0, 0), (K, 0), (0, 0), 0)
         self._sources: deque[_Sources] = deque(maxlen=lag_ticks)
@@ -128,9 +127,8 @@ class Decoder:
         self._best, self._starts = best, starts = self._best[:], self._starts[:]
         past, durations = self._past, self._least
         past.append((best, starts))
-        row, ends = past[-durations[0]]
-        rows = [row] * none if self._alike else [past[-ticks][0] for ticks in durations[:none]]
-        types_costs = map(add, costs, self._stay) if self._stays else costs
+        rows = [past[-ticks][0] for ticks in durations[:none]]
+        types_costs = map(add, costs, self._stay)
         base, changes, self._next.from_none = self._changes()
         first = ending = within = least = _NEVER
         first_in = ending_in = least_in = 0
@@ -162,10 +160,7 @@ class Decoder:
         row, none_ends = past[-durations[none]]
         self._costs = first, row[none] + total, ending
         self._sources.append(self._next)
-        if self._alike:
-            first_of, ending_of = (first_in, ends[first_in]), (ending_in, ends[ending_in])
-        else:
-            first_of, ending_of = ((k, past[-durations[k]][1][k]) for k in (first_in, ending_in))
+        first_of, ending_of = ((k, past[-durations[k]][1][k]) for k in (first_in, ending_in))
         self._next = _Sources(first_of, (none, none_ends[none]), ending_of, 0)
 
     def _changes(self) -> tuple[int, Sequence[int], int]:

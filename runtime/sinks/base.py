@@ -60,13 +60,14 @@ class Sink(ABC):
     ----------
     pace : PublishPace or None
         When it gets a result; None: it gets every frame's. `open_sink` sets it.
-    where, sent, lost, error
-        Its part of a `SinkReport`, for a sink without another `report`.
+    where, sent, lost, error, gone
+        Its part of a `SinkReport`.
     """
 
     pace: "PublishPace | None" = None
     where = error = ""
     sent = lost = 0
+    gone = False
 
     def begin(self, build: "Build") -> None:  # noqa: B027
         """Take the build that recognises, before the first frame."""
@@ -95,7 +96,8 @@ class Sink(ABC):
 
     def report(self) -> SinkReport:
         """Return the state of the sink itself."""
-        return SinkReport(self.where or type(self).__name__, self.readers(), self.sent, self.lost, self.error)
+        where = self.where or type(self).__name__
+        return SinkReport(where, self.readers(), self.sent, self.lost, self.error, self.gone)
 
     def readers(self) -> int | None:
         """Return the number of current readers; None if unknown."""

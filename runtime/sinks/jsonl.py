@@ -10,15 +10,16 @@ A line is sent whole or not at all.
 import os
 import stat
 import sys
+from abc import abstractmethod
 from contextlib import suppress
 from io import UnsupportedOperation
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal
 
 import msgspec
 from msgspec import json, structs
 
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+from .base import Sink, SinkError, SinkKind, SinkPlace
 
 
 class HeaderLine(msgspec.Struct, frozen=True, tag_field="kind", tag="header"):
@@ -68,7 +69,29 @@ def encode_health(report: HealthReport) -> bytes:
     return _encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"
 
 
-class JsonLines(Sink):
+class LineSink(Sink):
+    """Sends lines: a header wherever the joints change, grasps, and the glove's health."""
+
+    # Those that the last header named.
+    joints: tuple[str, ...] = ()
+
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Send one line, after a header if the joints are others than before."""
+        if angles is not None and angles.names != self.joints:
+            self.joints = angles.names
+            self.send("joints", encode_header(angles))
+        self.send("grasp", encode(grasp, preshape, angles))
+
+    def health(self, report: HealthReport) -> None:
+        """Send the report's line."""
+        self.send("health", encode_health(report))
+
+    @abstractmethod
+    def send(self, topic: Literal["joints", "grasp", "health"], line: bytes) -> None:
+        """Send a line, or lose it."""
+
+
+class JsonLines(LineSink):
     """Writes the lines to `file`, and waits for a slow reader, in a live run on its own thread (`Fanout`).
 
     A reader that is gone (`head`) is noted in the report. A full disk loses lines until it has room again.
@@ -81,30 +104,17 @@ class JsonLines(Sink):
         self._rest = b""
         self._owned = owned
         self.where = where
-        self._gone = False
-        self._joints: tuple[str, ...] = ()
 
-    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Write one line, after a header if the joints are others than before, or lose it."""
-        if angles is not None and angles.names != self._joints:
-            self._joints = angles.names
-            self._send(encode_header(angles))
-        self._send(encode(grasp, preshape, angles))
-
-    def health(self, report: HealthReport) -> None:
-        """Write one line, or lose it."""
-        self._send(encode_health(report))
-
-    def _send(self, line: bytes) -> None:
+    def send(self, topic: str, line: bytes) -> None:
         """Write the rest of a line that a full disk cut, then this line, or lose it."""
         left, sent = self._rest + line, False
         try:
-            while left and not self._gone:
+            while left and not self.gone:
                 left = left[self._write(left) :]
-            self._rest, sent = b"", not self._gone
+            self._rest, sent = b"", not self.gone
         except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
             self.error = getattr(reason, "strerror", None) or str(reason)
-            self._gone = isinstance(reason, BrokenPipeError)
+            self.gone = isinstance(reason, BrokenPipeError)
             torn = len(line) - len(left)
             self._rest = left[: max(-torn, 0)] if torn <= 0 or self._takes_back(torn) else left
         if line:
@@ -132,13 +142,9 @@ class JsonLines(Sink):
                     return True
         return False
 
-    def report(self) -> SinkReport:
-        """Return how this sink is doing."""
-        return structs.replace(super().report(), gone=self._gone)
-
     def close(self) -> None:
         """Finish the line that was begun, if the reader allows, and close the file if it was opened here."""
-        self._send(b"")
+        self.send("", b"")
         if self._owned:
             self._file.close()
 

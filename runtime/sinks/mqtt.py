@@ -7,42 +7,31 @@
 A broker that goes away is connected to again; what comes meanwhile is lost. The header is sent to it again.
 """
 
-from functools import partial
-
-from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from ..sources.mqtt import connect, leave, place_of
 from .base import Sink, SinkError, SinkKind, SinkPlace
-from .jsonl import encode, encode_header, encode_health
+from .jsonl import LineSink
 
 _RATE_HZ = 20
 # How long a broker may take nothing before a line is lost, live and in a replay.
 _LIVE_S, _REPLAY_S = 0.5, 10.0
 
 
-class MqttTopics(Sink):
+class MqttTopics(LineSink):
     """Publishes below the topic of mqtt:HOST:PORT/TOPIC. Raises SettingError and SinkError as `connect` does."""
 
     def __init__(self, where: str, longest_s: float = _LIVE_S) -> None:
         self.where, self._longest_s = where, longest_s
         *_, self._topic = place_of(where)
         self._client = connect(where, SinkError)
-        self._joints = list[str]()
         # A broker that was away lacks the header, or may have lost it.
-        self._client.on_connect = lambda *_: self._joints.clear()
+        self._client.on_connect = lambda *_: setattr(self, "joints", ())
 
-    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Publish the line, after a header if the joints are others than before."""
-        if angles is not None and list(angles.names) != self._joints:
-            self._joints[:] = angles.names
-            self.attempt(partial(self._send, "joints", encode_header(angles), retain=True))
-        self.attempt(partial(self._send, "grasp", encode(grasp, preshape, angles)))
+    def send(self, topic: str, line: bytes) -> None:
+        """Publish the line."""
+        self.attempt(lambda: self._send(topic, line))
 
-    def health(self, report: HealthReport) -> None:
-        """Publish the report's line."""
-        self.attempt(partial(self._send, "health", encode_health(report)))
-
-    def _send(self, topic: str, line: bytes, *, retain: bool = False) -> None:
-        sent = self._client.publish(f"{self._topic}/{topic}", line.rstrip(), retain=retain)
+    def _send(self, topic: str, line: bytes) -> None:
+        sent = self._client.publish(f"{self._topic}/{topic}", line.rstrip(), retain=topic == "joints")
         sent.wait_for_publish(self._longest_s)
         if not sent.is_published():
             raise TimeoutError("the broker takes nothing")

@@ -1,6 +1,6 @@
 """JSON lines to all readers of a TCP port.
 
-Everything happens inside `publish`, without threads and without waiting: new readers are accepted, and each gets the
+Everything happens inside `send`, without threads and without waiting: new readers are accepted, and each gets the
 line if it keeps up. A slow reader loses whole lines, which shows as gaps in `number`, and delays nobody. Only the rest
 of one line waits for it, and the system's buffer, which is kept small so that it does not read the past.
 
@@ -15,9 +15,8 @@ from contextlib import suppress
 
 from thenar.drivers.errors import SettingError
 
-from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
-from .base import Sink, SinkError, SinkKind
-from .jsonl import encode, encode_header, encode_health
+from .base import SinkError, SinkKind
+from .jsonl import LineSink
 
 _BACKLOG = 16
 MAX_READERS = 32
@@ -29,7 +28,7 @@ SEND_BUFFER = 16384
 _KNOCKS = 16
 
 
-class SocketLines(Sink):
+class SocketLines(LineSink):
     """Serves the readers of a listening socket, which it takes over."""
 
     def __init__(self, listener: socket.socket, where: str) -> None:
@@ -38,7 +37,6 @@ class SocketLines(Sink):
         self.where = where
         self._clients: list[_Reader] = []
         self._dropped = 0
-        self._joints: tuple[str, ...] = ()
         self._header = b""
 
     @property
@@ -47,20 +45,15 @@ class SocketLines(Sink):
         host, port = self._listener.getsockname()[:2]
         return host, port
 
-    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
-        """Accept new readers, and send every reader the line, after a header if the joints are others than before."""
+    def send(self, topic: str, line: bytes) -> None:
+        """Accept new readers, and send every reader the line; those that come later begin with the header."""
         self._accept_clients()
-        if angles is not None and angles.names != self._joints:
-            self._joints, self._header = angles.names, encode_header(angles)
-            self._send_all(self._header)
-        if self._clients:
-            self._send_all(encode(grasp, preshape, angles))
-
-    def health(self, report: HealthReport) -> None:
-        """Accept new readers, and send every reader the report's line."""
-        self._accept_clients()
-        if self._clients:
-            self._send_all(encode_health(report))
+        if topic == "joints":
+            self._header = line
+        for reader in tuple(self._clients):
+            sent = self._send(reader, line)
+            self.sent += sent
+            self.lost += not sent
 
     def _accept_clients(self) -> None:
         if self._listener.fileno() < 0:
@@ -80,12 +73,6 @@ class SocketLines(Sink):
         self._clients.append(_Reader(reader))
         if self._header:
             self._send(self._clients[-1], self._header)
-
-    def _send_all(self, line: bytes) -> None:
-        for reader in tuple(self._clients):
-            sent = self._send(reader, line)
-            self.sent += sent
-            self.lost += not sent
 
     def _send(self, reader: "_Reader", line: bytes) -> bool:
         try:

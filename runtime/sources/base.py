@@ -10,7 +10,7 @@ from msgspec import Struct
 from thenar.drivers.errors import SettingError
 from thenar.drivers.members import Members
 
-from ..frames import GloveFrame, Mask, SwitchFrame
+from ..frames import GloveFrame, Mask, SwitchFrame, bits
 from ..harness.wiring import Debounce, Harness
 from ..names import list_names
 from ..published import Count
@@ -155,8 +155,7 @@ class Debouncer:
 
     A snap-action switch bounces for up to 3 ms when it closes and 8 ms when it opens (Panasonic EVQPL; other tact
     switches 10 ms). Presses are eager, with a lockout; releases are deferred, as is usual where a press must not wait
-    (QMK's `asym_eager_defer_pk`). All switches are processed together as bits of one integer; those that change
-    together share timers.
+    (QMK's `asym_eager_defer_pk`). All switches are processed together as bits of one integer.
 
     press_lockout_us  readings of a switch are ignored for this time after its press
     release_us        a switch opens once all its readings were open for this time. A release is not deferred to a scan
@@ -175,14 +174,14 @@ class Debouncer:
         self.press_lockout_us, self.release_us = press_lockout_us, release_us
         self._pause_us = 2 * max(press_lockout_us, release_us)
         self._closed: Mask = 0
-        # Read in the last update; and the others, with the time of their last reading.
-        self._known: Mask = 0
-        self._unread: list[tuple[int, Mask]] = []
         self._time: int | None = None
         self._period: int | None = None
-        # Ignored until a time; read open since a time. The two are disjoint, and each switch is in at most one group.
-        self._locks: list[tuple[int, Mask]] = []
-        self._openings: list[tuple[int, Mask]] = []
+        # Read in the last update; and of the others, by their bits, the time of their last reading.
+        self._known: Mask = 0
+        self._unread: dict[Mask, int] = {}
+        # By bits of switches: ignored until a time; read open since a time. No switch is in both.
+        self._locks: dict[Mask, int] = {}
+        self._openings: dict[Mask, int] = {}
 
     def update(self, time_us: int, closed: Mask, known: Mask) -> Mask:
         """Return the closed switches after a reading of those in `known` at `time_us`, with `closed` among them closed.
@@ -200,46 +199,36 @@ class Debouncer:
             self._period = interval or self._period
         else:
             self._period = min(interval, self._period + (self._period >> 2) + 1)
-        free = known
-        if self._locks:
-            self._locks = [lock for lock in self._locks if lock[0] > now]
-            for _, mask in self._locks:
-                free &= ~mask
-        pressed, opened = closed & free & ~self._closed, ~closed & free & self._closed
-        if opened or self._openings:
-            self._closed &= ~self._released(now, opened, closed & free)
-        if pressed:
-            self._closed |= pressed
-            self._locks.append((now + self.press_lockout_us, pressed))
+        self._locks = {switch: until for switch, until in self._locks.items() if until > now}
+        free = known & ~sum(self._locks)
+        pressed = closed & free & ~self._closed
+        for switch in bits(~closed & free & self._closed):
+            since = self._openings.setdefault(switch, now)
+            # Open for long enough, or before the next reading: its bounce is locked out.
+            if now + (self._period or 0) >= since + self.release_us:
+                self._closed ^= switch
+                self._locks[switch] = self._openings.pop(switch) + self.release_us
+        _drop(self._openings, closed & free)
+        self._closed |= pressed
+        self._locks |= dict.fromkeys(bits(pressed), now + self.press_lockout_us)
         return self._closed
 
     def _forget_after_pauses(self, last_us: int, interval: int, known: Mask) -> None:
         """Take which switches are read, `interval` after the last reading; begin anew with those that had a pause."""
-        since, now = [(last_us, self._known), *self._unread], last_us + interval
-        over = sum(mask & known for time, mask in since if now - time > self._pause_us)
-        self._unread = [(time, rest) for time, mask in since if (rest := mask & ~known)]
+        times = self._unread | dict.fromkeys(bits(self._known), last_us)
+        latest_us = last_us + interval - self._pause_us
+        over = sum(switch for switch, time_us in times.items() if switch & known and time_us < latest_us)
+        self._unread = {switch: time_us for switch, time_us in times.items() if not switch & known}
         self._known = known
         self._closed &= ~over
-        self._locks, self._openings = (
-            [(time, mask & ~over) for time, mask in timers if mask & ~over] for timers in (self._locks, self._openings)
-        )
+        for timers in (self._locks, self._openings):
+            _drop(timers, over)
 
-    def _released(self, now: int, opened: Mask, closed: Mask) -> Mask:
-        """Return the open switches whose release time is over, or would be before the next reading; their bounce is
-        locked out.
-        """
-        fresh, released, openings = opened, 0, list[tuple[int, Mask]]()
-        for _, group in self._openings:
-            fresh &= ~group
-        for since, group in (*self._openings, (now, fresh)):
-            going = group & opened
-            if going and now + (self._period or 0) >= since + self.release_us:
-                self._locks.append((since + self.release_us, going))
-                released |= going
-            if rest := group & ~closed & ~released:
-                openings.append((since, rest))
-        self._openings = openings
-        return released
+
+def _drop(timers: dict[Mask, int], switches: Mask) -> None:
+    """Remove the timers of these switches."""
+    for switch in [each for each in timers if each & switches]:
+        del timers[switch]
 
 
 def debouncer_of(debounce: Debounce) -> Debouncer | None:

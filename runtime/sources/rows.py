@@ -469,12 +469,6 @@ def steps_of(limits: Range) -> int:
     return int(span) if whole else _TAXEL_STEPS
 
 
-def joint_number(limits: Range, code: int) -> float:
-    """Return a number that a joint's range codes as `code`, 1 to 255."""
-    first, last = JOINT_CODES
-    return limits[0] + (code - first) * (limits[1] - limits[0]) / (last - first)
-
-
 def stream_period_us(wiring: StreamWiring) -> int:
     """Return the longest expected period of a stream, including the transport of a row on a good line."""
     return max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS

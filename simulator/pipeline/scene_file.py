@@ -14,7 +14,7 @@ from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.taxonomy import Taxonomy, published
 from thenar.runtime.names import fault, list_names, nearest
 from thenar.runtime.toml_source import Place, TomlText, read_source
-from thenar.runtime.toml_struct import as_list, as_table, check_finite, check_keys, convert
+from thenar.runtime.toml_struct import as_list, as_table, check_keys, convert
 
 from ..body.shapes import Shape
 from ..errors import SceneError, ThenarError
@@ -47,9 +47,7 @@ def load_catalogue(name_or_path: str | Path) -> tuple[Taxonomy, tuple[SceneObjec
     """
     file = name_or_path if isinstance(name_or_path, Path) else _shipped(name_or_path)
     source = read_source(file, SceneError)
-    tables = source.tables()
-    check_finite(source, (), tables)
-    catalogue = convert(source, (), tables, _CatalogueFile)
+    catalogue = convert(source, (), source.tables(), _CatalogueFile)
     taxonomy = find_taxonomy(source, catalogue.taxonomy)
     return taxonomy, objects_of(source, catalogue.objects, taxonomy)
 
@@ -149,9 +147,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     """
     path = Path(name_or_path)
     source = read_source(_file(path), SceneError)
-    tables = source.tables()
-    check_finite(source, (), tables)
-    return _Decoder(source, convert(source, (), tables, _SceneFile)).scene(path.stem)
+    return _Decoder(source, convert(source, (), source.tables(), _SceneFile)).scene(path.stem)
 
 
 def located(name_or_path: str | Path, fault: SceneError) -> ThenarError:

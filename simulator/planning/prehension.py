@@ -15,7 +15,7 @@ import numpy as np
 from thenar.compiler.elementary import Floats
 from thenar.runtime.names import nearest
 from thenar.runtime.toml_source import Place, TomlText, read_source
-from thenar.runtime.toml_struct import as_table, check_finite, convert
+from thenar.runtime.toml_struct import as_table, convert
 
 from ..body.hand import CAPSULES, DIGITS, LIMITS_DEG, Hand, Size
 from ..errors import SceneError
@@ -68,9 +68,7 @@ class _Table(msgspec.Struct, frozen=True):
 def load_prehensions(file: Traversable) -> dict[str, Prehension]:
     """Return the grasp types in the `[types.*]` of a table, by name. Raises SceneError with file, line and key."""
     source = read_source(file, SceneError)
-    tables = source.tables()
-    check_finite(source, (), tables)
-    types = as_table(source, ("types",), convert(source, (), tables, _Table).types)
+    types = as_table(source, ("types",), convert(source, (), source.tables(), _Table).types)
     return {name: _prehension(source, ("types", name), table) for name, table in types.items()}
 
 

@@ -14,9 +14,9 @@ from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, 
 from thenar.drivers.emulated.lines import BoardSender, LineSender, lines_like
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.transports import is_serial
-from thenar.runtime.calibration import load_calibration
+from thenar.runtime.calibration import load_calibration, numbers_of
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring, StreamWiring
-from thenar.runtime.sources.rows import joint_number, steps_of
+from thenar.runtime.sources.rows import steps_of
 
 from ..effects import wire_damaged_bytes, wire_lost_bytes
 from ..scenes.scene import Scene
@@ -151,14 +151,14 @@ class Bench(Closing):
         for name, (low, high) in wiring.taxels.items():
             code = taxels[self._taxels[name]] if name in self._taxels else 0
             found[name] = low + code * (high - low) / steps_of((low, high))
-        for name, limits in wiring.joints.items():
-            place, unit = self._joints.get(name, (-1, ""))
+        for line in numbers_of(wiring.joints):
+            name, (place, unit) = line.name, self._joints.get(line.name, (-1, ""))
             if place >= 0:
                 found[name] = joints[place]
                 if unit == "raw":
-                    found[name] = joint_number(limits, round(joints[place]))
+                    found[name] = line.value(round(joints[place]))
                 elif name in self._lines[number]:
-                    found[name] = joint_number(limits, self._lines[number][name](joints[place]))
+                    found[name] = line.value(self._lines[number][name](joints[place]))
         return found
 
     def show(

@@ -1,4 +1,5 @@
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,12 @@ CALIBRATIONS = st.builds(
     st.lists(LINES, unique_by=lambda line: line.name, max_size=5),
 )
 SENSOR = '{ name = "index_mpj", raw_a = 96, value_a = 0.0, raw_b = 161, value_b = 90.0 }'
+
+
+@pytest.mark.parametrize("values", [(0.0, math.inf), (math.nan, 90.0)])
+def test_values_are_finite_numbers(values: tuple[float, float]) -> None:
+    with pytest.raises(SettingError, match="'index_mpj': value_a and value_b must be finite numbers"):
+        SensorCalibration("index_mpj", 96, values[0], 161, values[1])
 
 
 @given(CALIBRATIONS)
@@ -54,10 +61,7 @@ def test_a_file_is_as_its_docstring_shows_it(tmp_path: Path) -> None:
         (f"sensor = [{SENSOR.replace('96', '0')}]", r"sensor\[0\]\.raw_a: must be at (least|most)"),
         (f"sensor = [{SENSOR.replace('96', '256')}]", r"sensor\[0\]\.raw_a: must be at (least|most)"),
         (f"sensor = [{SENSOR.replace('96', '161')}]", r"sensor\[0\]: 'index_mpj': raw_a and raw_b are both 161"),
-        (
-            f"sensor = [{SENSOR.replace('90.0', 'inf')}]",
-            r"sensor\[0\]: 'index_mpj': value_a and value_b must be finite",
-        ),
+        (f"sensor = [{SENSOR.replace('90.0', 'inf')}]", r"sensor\[0\]\.value_b: must be a finite number, not inf"),
         (
             f"sensor = [{', '.join(SENSOR.replace('index', str(n)) for n in range(13_000))}]",
             "larger than 1000000 bytes",

@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -118,7 +119,7 @@ def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:
     [
         ("taxel = [{name = 'a', rest = 5, press = 5}]", "rest and press are both 5"),
         ("taxel = [{name = 'a', rest = 5, press = 9, value = 0.0}]", "a number above 0"),
-        ("taxel = [{name = 'a', rest = 5, press = 9, value = nan}]", "a number above 0"),
+        ("taxel = [{name = 'a', rest = 5, press = 9, value = nan}]", r"taxel\[0\]\.value: must be a finite number"),
         ("taxel = [{name = 'a', rest = 5, press = 9}, {name = 'a', rest = 1, press = 2}]", "calibrated twice: a"),
         ("taxel = [{name = 'a', rest = 5, press = 70000}]", "press"),
         ("taxel = [{name = '', rest = 5, press = 7}]", "name"),
@@ -129,6 +130,11 @@ def test_a_wrong_calibration_is_refused(tmp_path: Path, text: str, said: str) ->
     file.write_text(text)
     with pytest.raises(SettingError, match=said):
         load_taxel_calibration(file)
+
+
+def test_the_value_of_a_press_is_a_finite_number() -> None:
+    with pytest.raises(SettingError, match="the value of a press must be a number above 0, not nan"):
+        TaxelLine("a", 5, 9, math.nan)
 
 
 @given(

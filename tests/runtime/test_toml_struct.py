@@ -5,7 +5,7 @@ import pytest
 
 from thenar.runtime.errors import ThenarError
 from thenar.runtime.toml_source import TomlText
-from thenar.runtime.toml_struct import check_finite, convert
+from thenar.runtime.toml_struct import convert
 
 
 class OwnError(ThenarError, ValueError):
@@ -102,7 +102,7 @@ def test_a_key_in_another_unit_is_told_the_nearest(key: str, advice: str) -> Non
 def test_a_number_that_is_not_finite_is_found_wherever_it_stands(number: str) -> None:
     source = TomlText("a.toml", f"a = 1\n[[b]]\nc = [1,\n {number}]\n", OwnError)
     with pytest.raises(OwnError, match=r"line 4: b\[0\]\.c\[1\]: must be a finite number"):
-        check_finite(source, (), source.tables())
+        source.tables()
 
 
 def test_what_is_no_table_is_refused() -> None:

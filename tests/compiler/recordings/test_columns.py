@@ -1,9 +1,17 @@
+import math
 from pathlib import Path
 
 import pytest
 
 from thenar.compiler.recordings import TableError
-from thenar.compiler.recordings.columns import CalibrationPoints, ColumnRoles, JointColumns, read_columns, select
+from thenar.compiler.recordings.columns import (
+    CalibrationPoints,
+    ColumnRoles,
+    JointColumns,
+    TaxelColumns,
+    read_columns,
+    select,
+)
 
 NAMES = ["grasp", "who", "what", "s1", "s2", "s10", "j1", "j2"]
 
@@ -69,7 +77,10 @@ def test_every_key_is_read(tmp_path: Path) -> None:
         ('label = "a"\ntime_unit = "s"', "`time_unit` is given without `time`"),
         ('label = "a"\ntrial = "b"\nframes = "restart"', "`trial` and `frames` = 'restart' both say what"),
         ("label = []", "`label` must name a column"),
-        ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = inf', "`threshold` must be a finite number, 'otsu' or"),
+        (
+            'label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = inf',
+            r"taxels\[0\]\.threshold: must be a finite number, not inf",
+        ),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nbits = 17', "bits: "),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nbits = 12\ngrid = 2', "`bits` is for counts"),
         (
@@ -77,9 +88,15 @@ def test_every_key_is_read(tmp_path: Path) -> None:
             "`codes`, `bits`, `grid`, `origin` and `calibration` are for taxels without `threshold`",
         ),
         ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = 0', "`grid` must be above 0, not 0"),
-        ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = nan', "`grid` must be above 0"),
+        (
+            'label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = nan',
+            r"joints\[0\]\.grid: must be a finite number, not nan",
+        ),
         ('label = "a"\n[[joints]]\ncolumns = ["b"]\ncodes = true\ngrid = 1', "`grid` and `origin` are for values"),
-        ('label = "a"\n[[joints]]\ncolumns = ["b"]\norigin = inf', "`origin` must be a finite number"),
+        (
+            'label = "a"\n[[joints]]\ncolumns = ["b"]\norigin = inf',
+            r"joints\[0\]\.origin: must be a finite number, not inf",
+        ),
         (f'label = "a"\ndelimiter = "{"x" * 100_000}"', "`delimiter` must be one character, not 'xxx"),
     ],
 )
@@ -87,6 +104,15 @@ def test_a_wrong_key_is_named(text: str, reason: str, tmp_path: Path) -> None:
     with pytest.raises(TableError, match=f"^columns.toml.*{reason}") as refused:
         read(text, tmp_path)
     assert len(str(refused.value)) < 500
+
+
+def test_numbers_of_columns_are_finite() -> None:
+    with pytest.raises(ValueError, match="`grid` must be above 0, not nan"):
+        JointColumns(("b",), grid=math.nan)
+    with pytest.raises(ValueError, match="`origin` must be a finite number, not inf"):
+        JointColumns(("b",), origin=math.inf)
+    with pytest.raises(ValueError, match="`threshold` must be a finite number, 'otsu' or 'learnt', not inf"):
+        TaxelColumns(("b",), threshold=math.inf)
 
 
 def test_globs_pick_columns_in_their_own_order_then_the_tables() -> None:

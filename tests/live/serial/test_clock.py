@@ -64,7 +64,7 @@ def test_a_date_that_steps_changes_no_answer_no_age_and_no_recording(
     running.recorder.close()
     assert running.recorder.failure is None
     pairs = list(replayed(running.system.build, path, running.system.policy))
-    assert [now for _, now in pairs] == [then for then, _ in pairs] == scene.grasps.all
+    assert [now.grasp for _, now in pairs] == [then for then, _ in pairs] == scene.grasps.all
     reader = Reader(path)
     assert len(list(reader)) > len(pairs)
     assert not reader.altered

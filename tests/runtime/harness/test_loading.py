@@ -105,7 +105,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
         ("[[stream]]\nport = 'x'", "line 1: stream[0]: must have one of the keys switches, joints and taxels"),
         (
             "[[stream]]\nport = 'x'\nswitches = ['a', 'b', 'a']",
-            "line 3: stream[0].switches[2]: switch 'a' is already stream[0].switches[0]: wire it in one place",
+            "line 3: stream[0].switches[2]: switch 'a' is already stream[0].switches[0]: use the name in one place",
         ),
         (
             "[[stream]]\nport = 'x'\nswitches = [' a']",
@@ -140,7 +140,7 @@ def test_faults_of_lines_and_buses_name_their_place(load: Load, text: str, messa
         ("pins = { GPA0 = '' }", "bus[0].chip[0].pins.GPA0: '' is not a valid name of a switch: it is empty"),
         (
             "pins = { GPA0 = 'a', GPA1 = 'a' }",
-            "bus[0].chip[0].pins.GPA1: switch 'a' is already bus[0].chip[0].pins.GPA0: wire it in one place",
+            "bus[0].chip[0].pins.GPA1: switch 'a' is already bus[0].chip[0].pins.GPA0: use the name in one place",
         ),
         ("closed = 'lo'", "bus[0].chip[0].closed: 'lo' is not among its values (did you mean 'low'"),
         ("kind = 'pcf8574'\nclosed = 'high'", "bus[0].chip[0].closed: a pcf8574 pulls its inputs up"),

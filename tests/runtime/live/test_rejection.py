@@ -128,7 +128,7 @@ def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, d
     lead = data.draw(st.integers(-40, 40))
     lanes = build.scorer.biased_scores(np.array([data.draw(st.booleans()) for _ in range(6)]), [])
     plain = Ranking(lanes)
-    both, none = plain.with_none_class(lead), len(lanes)
+    both, none = Ranking((*lanes, max(lanes) + lead)), len(lanes)
     assert both.candidate == (none if lead > 0 else plain.candidate)
     assert both.biased_scores[none] - max(lanes) == lead
     for held in range(none):

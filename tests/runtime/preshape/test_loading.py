@@ -158,8 +158,8 @@ def test_ones_own_table_is_in_rad_and_metres_afterwards(own: Path) -> None:
         ("[45, 40]", "[45, 41]", "line 16: preshapes[0].positions[1]: 41 mm is outside 0 to 40, the range of slides"),
         ("[45, 40]", "[nan, 40]", "line 16: preshapes[0].positions[0]: must be a finite number, not nan"),
         ('["Tip"]', '["PoS"]', "line 22: preshapes[1].grasps[0]: 'PoS' already has preshape 'open'"),
-        ('"closed"', '"open"', "line 20: preshapes[1].name: preshape 'open' is named twice"),
-        ('"slides"', '"turns"', "line 10: joints[1].name: joint 'turns' is named twice"),
+        ('"closed"', '"open"', "line 20: preshapes[1].name: preshape 'open' is already preshapes[0].name"),
+        ('"slides"', '"turns"', "line 10: joints[1].name: joint 'turns' is already joints[0].name"),
         ("[0, 40]", "[40, 0]", "line 12: joints[1].range: must be the lowest and then the highest position"),
     ],
 )

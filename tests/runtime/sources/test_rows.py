@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.lines import SEQUENCES, LineCounts, LineParser, Row, RowReader, checked
+from thenar.runtime.calibration import numbers_of
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
@@ -15,7 +16,7 @@ from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources import rows as module
 from thenar.runtime.sources.base import slowest_us
-from thenar.runtime.sources.rows import RowSource, joint_number, steps_of
+from thenar.runtime.sources.rows import RowSource, steps_of
 
 GLOVE = """
 [debounce]
@@ -114,7 +115,8 @@ def test_grids_are_those_that_are_stated(number: int, code: int) -> None:
     grid = module._Grid((0, 4095), 0, steps_of((0, 4095)))
     assert grid.code(number) == number
     for limits in ((0.0, 4095.0), (3.3, 0.0), (-90.0, 90.0)):
-        assert module._Grid(limits, 1, 255).code(joint_number(limits, code)) == code
+        (line,) = numbers_of({"joint": limits})
+        assert module._Grid(limits, 1, 255).code(line.value(code)) == code
 
 
 def test_values_that_are_no_numbers_lose_their_inputs_and_no_others(play: Play) -> None:
