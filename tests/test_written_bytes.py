@@ -25,7 +25,6 @@ from thenar.runtime.recording.session import Session
 
 GOLDEN = Path(__file__).parent / "golden" / "written-bytes.json"
 COLUMNS = Path(__file__).resolve().parents[1] / "examples" / "columns"
-CORE = Path(__file__).resolve().parents[1] / "firmware_templates" / "core"
 SCENES = ("quick", "kamakura", "kamakura-def", "cutkosky", "cutkosky-def", "continuous", "faulty-glove", "crowd")
 FEWER = {"crowd": ["--subjects", "4", "--repetitions", "6"]}  # of a hundred hands
 
@@ -44,25 +43,24 @@ def kept(name: str, written: dict[str, str], update: bool) -> None:
         assert written == golden[name]
 
 
+def digest(written: object) -> str:
+    return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+
+
+def contents(build: Path) -> Iterator[tuple[str, str]]:
+    """Yield each file of a build and its digest; of its firmware, of which a folder stands in golden/firmware, one."""
+    yield from ((f"{build.name}/{name}", found) for name, found in digests(build) if not name.startswith("firmware/"))
+    yield f"{build.name}/firmware", digest(dict(digests(build / "firmware")))
+
+
 def builds_of(grasps: Path, glove: Path, folder: Path) -> dict[str, str]:
-    """Compile `grasps` with sums of 16 bits and a wiring, and with tables of 8 bits; return the digest of each file
-    but those of the core, which are the same in all.
-    """
+    """Compile `grasps` with sums of 16 bits and a wiring, and with tables of 8 bits; return the digests."""
     whole, small = folder / "whole", folder / "small"
     common = ["compile", str(grasps), "--folds", "0", "--no-report", "--rounds", "10"]
     assert run([*common, "-o", str(whole), "--glove", str(glove)]) == 0
     assert run([*common, "-o", str(small), "--table-bits", "8", "--max-bins", "8"]) == 0
-    core = dict(digests(CORE))
-    return {"set.grasps": hashlib.sha256(grasps.read_bytes()).hexdigest()} | {
-        f"{build.name}/{name}": digest
-        for build in (whole, small)
-        for name, digest in digests(build)
-        if digest != core.get(Path(name).name)
-    }
-
-
-def digest(written: object) -> str:
-    return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+    found = {"set.grasps": hashlib.sha256(grasps.read_bytes()).hexdigest()}
+    return found | dict(contents(whole)) | dict(contents(small))
 
 
 def results_of(grasps: Path, glove: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
@@ -155,10 +153,6 @@ def test_a_set_gives_the_same_builds(
     tmp_path: Path, set_of: Callable[[str], Path], glove_for: Callable[[str], Path], name: str, update_golden: bool
 ) -> None:
     kept(name, builds_of(set_of(name), glove_for(name), tmp_path), update_golden)
-
-
-def test_the_core_of_the_firmware_keeps_its_bytes(update_golden: bool) -> None:
-    kept("core", dict(digests(CORE)), update_golden)
 
 
 def test_a_recording_keeps_its_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, update_golden: bool) -> None:
