@@ -1,8 +1,6 @@
 """Pads with levels from a set to recognition: compiled for a board, emulated, recognised, recorded, imported."""
 
 import json
-import os
-import shutil
 import sys
 from bisect import bisect
 from pathlib import Path
@@ -15,6 +13,7 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.reader import Reader
 
+from ..conftest import tool
 from ..sets import grasp_set_of
 from .conftest import thenar
 
@@ -82,9 +81,8 @@ def pads(folder: Path) -> Path:
 
 @pytest.mark.parametrize("wiring", GLOVES)
 def test_a_glove_of_pads_recognises_by_their_levels(tmp_path: Path, wiring: str) -> None:
-    if wiring != "board" and shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    if wiring != "board":
+        tool("umockdev-wrapper")
     grasps, glove, build = pads(tmp_path), tmp_path / "glove.toml", tmp_path / "build"
     glove.write_text(GLOVES[wiring])
     done = thenar("compile", grasps, "-o", build, "--rounds", "10", "--folds", "0", "--glove", glove, "--no-report")
@@ -110,9 +108,7 @@ def test_a_glove_of_pads_recognises_by_their_levels(tmp_path: Path, wiring: str)
 
 
 def test_doctor_finds_converters_and_what_is_wrong_with_them(tmp_path: Path) -> None:
-    if shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    tool("umockdev-wrapper")
     grasps, glove, own = pads(tmp_path), tmp_path / "glove.toml", tmp_path / "own.toml"
     glove.write_text(GLOVES["spi and i2c"])
     # A converter more than there is: its address acknowledges nothing.

@@ -1,6 +1,5 @@
 """Integer tables of any size, and a build folder around them, without training anything; and results to publish."""
 
-import os
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
@@ -20,6 +19,7 @@ from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Line
 from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Preshape, Quarantined
 
+from ..conftest import lacking
 from ..tables import describe as _describe
 
 MakeTables = Callable[..., IntegerTables]
@@ -125,7 +125,7 @@ def make_grasp() -> MakeGrasp:
 def ros() -> ModuleType:
     """Return the messages of ROS, if Cyclone DDS is installed."""
     if find_spec("cyclonedds") is None:
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)("cyclonedds is missing")
+        lacking("cyclonedds")
     return import_module("thenar.runtime.ros_dds")
 
 
