@@ -11,7 +11,7 @@ from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.live import checkup
 
-from .conftest import thenar
+from .conftest import refusal, thenar, works
 
 NAMES = ["j0", "j1", *SENSORS_18[2:]]
 
@@ -38,8 +38,7 @@ def calibrated(harness: Path, *joints: str) -> None:
 
 def test_doctor_measures_records_as_fast_as_they_come_against_the_formula(harness: Path) -> None:
     harness.write_text(harness.read_text() + "rate_hz = 10\n")
-    done = thenar("doctor", harness, "--json")
-    assert done.returncode == 0, done.stderr
+    done = works("doctor", harness, "--json")
     (found,) = json.loads(done.stdout)
     assert found["present"]
     assert round(found["predicted_us"]) == 6323
@@ -53,8 +52,7 @@ def test_a_box_without_a_mask_is_found(
     build = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs="joints").folder
     calibrated(harness, "j0", "j1")
     glove.box.doubts = Doubts(mask="ignored")
-    done = thenar("doctor", harness, "--build", build)
-    assert done.returncode == 0, done.stderr
+    done = works("doctor", harness, "--build", build)
     assert "it accepts no sensor mask" in " ".join(done.stdout.split())
 
 
@@ -72,9 +70,7 @@ def test_a_port_that_writes_to_a_file_is_refused(tmp_path: Path, table: str) -> 
     path, victim = tmp_path / "glove.toml", tmp_path / "victim"
     victim.write_text("kept")
     path.write_text(table.format(f'"spy:///dev/null?file={victim}"'))
-    done = thenar("doctor", path)
-    assert done.returncode == 2
-    assert "port: 'spy:///dev/null?file=" in done.stderr
+    assert "port: 'spy:///dev/null?file=" in refusal("doctor", path)
     path.write_text(table.format(f'"{victim}"'))
     assert thenar("doctor", path).returncode == 1
     assert victim.read_text() == "kept"
@@ -94,12 +90,9 @@ def test_what_a_build_needs_of_the_calibration_is_found(small_set: GraspSet, har
     assert done.returncode == 1
     assert "calibrate it (`thenar calibrate`)" in done.stdout
     calibrated(harness, "j0", "j1")
-    done = thenar("doctor", harness, "--build", build)
-    assert done.returncode == 0, done.stdout
+    works("doctor", harness, "--build", build)
 
 
 def test_a_harness_without_devices_is_refused(tmp_path: Path) -> None:
     (tmp_path / "glove.toml").write_text("")
-    done = thenar("doctor", tmp_path / "glove.toml")
-    assert done.returncode == 2
-    assert "glove.toml names no device" in done.stderr
+    assert "glove.toml names no device" in refusal("doctor", tmp_path / "glove.toml")

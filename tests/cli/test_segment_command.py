@@ -16,6 +16,7 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.trainers.base import Trainer
 
 from ..sets import grasp_set_of
+from .conftest import refusal
 
 TYPES = ("hook", "pinch")
 PARTS = (12, 30, 8)
@@ -124,17 +125,13 @@ def test_refusals_say_what_to_do(
 ) -> None:
     grasp_set = GraspSet.load(movements)
     replace(grasp_set.without_none(), independent=True).save(tmp_path / "rows.grasps")
-    assert run(["segment", str(tmp_path / "rows.grasps"), "-b", str(build)]) == 2
-    assert "whole movements" in capsys.readouterr().err
+    assert "whole movements" in refusal("segment", tmp_path / "rows.grasps", "-b", build)
     assert run(["segment", str(movements), "-b", str(build), "-o", str(movements)]) == 2
     capsys.readouterr()
-    assert run(["evaluate", str(tmp_path / "rows.grasps"), "--streams"]) == 2
-    assert "whole movements" in capsys.readouterr().err
+    assert "whole movements" in refusal("evaluate", tmp_path / "rows.grasps", "--streams")
     grasp_set.without_none().save(tmp_path / "held.grasps")
-    assert run(["evaluate", str(tmp_path / "held.grasps"), "--streams"]) == 2
-    assert "nothing is held" in capsys.readouterr().err
-    assert run(["evaluate", str(movements), "--streams", "--subject", "A"]) == 2
-    assert "a subject out takes two" in capsys.readouterr().err
+    assert "nothing is held" in refusal("evaluate", tmp_path / "held.grasps", "--streams")
+    assert "a subject out takes two" in refusal("evaluate", movements, "--streams", "--subject", "A")
 
 
 def test_streams_are_evaluated_without_the_subject(

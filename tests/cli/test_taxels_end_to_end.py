@@ -15,7 +15,7 @@ from thenar.runtime.recording.reader import Reader
 
 from ..conftest import tool
 from ..sets import grasp_set_of
-from .conftest import thenar
+from .conftest import thenar, works
 
 # In real time, over a pty.
 pytestmark = pytest.mark.slow
@@ -85,13 +85,11 @@ def test_a_glove_of_pads_recognises_by_their_levels(tmp_path: Path, wiring: str)
         tool("umockdev-wrapper")
     grasps, glove, build = pads(tmp_path), tmp_path / "glove.toml", tmp_path / "build"
     glove.write_text(GLOVES[wiring])
-    done = thenar("compile", grasps, "-o", build, "--rounds", "10", "--folds", "0", "--glove", glove, "--no-report")
-    assert done.returncode == 0, done.stderr
+    works("compile", grasps, "-o", build, "--rounds", "10", "--folds", "0", "--glove", glove, "--no-report")
     record, log = tmp_path / "run.mcap", tmp_path / "log.jsonl"
     run = ("run", build, "--glove", "{glove}", "--frames", "800", "--record", record)
     emulate = ("emulate", grasps, "--glove", glove, "--dir", tmp_path / "emulated", "--period-ms", "100", "--log", log)
-    done = thenar(*emulate, "--", sys.executable, "-m", "thenar.cli", *run)
-    assert done.returncode == 0, done.stderr
+    done = works(*emulate, "--", sys.executable, "-m", "thenar.cli", *run)
     shown = [json.loads(line) for line in log.read_text().splitlines()]
     starts = [frame["time_us"] for frame in shown]
     judged = 0
@@ -103,8 +101,7 @@ def test_a_glove_of_pads_recognises_by_their_levels(tmp_path: Path, wiring: str)
     assert judged > 50
     coded = [entry.taxels for entry in Reader(record) if isinstance(entry, SwitchFrame) and entry.taxels is not None]
     assert len(coded) > 100
-    done = thenar("run", build, "--replay", record)
-    assert done.returncode == 0, done.stderr
+    works("run", build, "--replay", record)
 
 
 def test_doctor_finds_converters_and_what_is_wrong_with_them(tmp_path: Path) -> None:
