@@ -128,10 +128,9 @@ def imported(*arguments: str, output: str = "set.grasps") -> GraspSet:
     return GraspSet.load(output)
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """Return the sentence by which an import is refused."""
-    capsys.readouterr()
-    assert run(["import", *arguments, "-o", "set.grasps", "--overwrite"]) == 2
-    said = capsys.readouterr().err
-    assert (said[:8], said.count("\n"), "Traceback" in said) == ("thenar: ", 1, False)
+def refused(*arguments: str) -> str:
+    """Return the sentence by which an import is refused, after what it has found."""
+    done = thenar("import", *arguments, "-o", "set.grasps", "--overwrite")
+    said = done.stderr
+    assert (done.returncode, said[:8], said.count("\n"), "Traceback" in said) == (2, "thenar: ", 1, False)
     return said

@@ -6,12 +6,11 @@ import click
 import pytest
 from click.shell_completion import ShellComplete
 
-from thenar.cli import run
 from thenar.cli.group import COMMANDS, thenar
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.trainers.base import TRAINERS
 
-from .conftest import refusal
+from .conftest import refusal, works
 
 
 @pytest.mark.parametrize(
@@ -61,12 +60,10 @@ def test_an_unknown_target_is_answered_with_the_general_one() -> None:
         assert "Use `generic` for any other part with a C99 compiler" in line
 
 
-def test_help_is_a_command_too(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_is_a_command_too() -> None:
     for words, command in ((["help"], []), (["help", "place"], ["place"])):
-        assert run(words) == 0
-        asked = capsys.readouterr().out
-        assert run([*command, "--help"]) == 0
-        assert capsys.readouterr().out == asked
+        asked = works(*words).stdout
+        assert works(*command, "--help").stdout == asked
 
 
 def completed(*words: str) -> list[str]:

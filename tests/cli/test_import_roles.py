@@ -283,9 +283,7 @@ def test_text_that_is_constant_within_trials_is_a_subject_or_session(import_cell
         assert words in said
 
 
-def test_every_command_counts_trials_grasps_rests_and_frames_alike(
-    tmp_path: Path, import_cells: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_command_counts_trials_grasps_rests_and_frames_alike(tmp_path: Path, import_cells: Import) -> None:
     random = np.random.default_rng(5)
     trial, _ = np.indices((24, 5)).reshape(2, -1)
     kind = np.where(trial % 2, 1 + trial // 2 % 3, 0)
@@ -302,8 +300,7 @@ def test_every_command_counts_trials_grasps_rests_and_frames_alike(
         ("merge", path, "-o", f"{folder}/merged.grasps"),
         ("split", path, "--by", "subject", "-o", f"{folder}/parts"),
     ):
-        assert run([*arguments]) == 0
-        assert size in capsys.readouterr().out
+        assert size in works(*arguments).stdout
     quick = ("--folds", "2", "--repeats", "1", "--rounds", "2", "--tables", "compositions", "--baselines", "none")
-    assert run(["evaluate", path, *quick, "--jobs", "1"]) == 0
-    assert "12 trials of 60 frames, 3 grasp types; 12 rests left out;" in " ".join(capsys.readouterr().out.split())
+    done = works("evaluate", path, *quick, "--jobs", "1")
+    assert "12 trials of 60 frames, 3 grasp types; 12 rests left out;" in " ".join(done.stdout.split())

@@ -7,10 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thenar.cli import run
 from thenar.compiler import from_dataframe
 
-from .conftest import columns_toml, imported, refusal, refused
+from .conftest import columns_toml, imported, refusal, refused, works
 
 pytestmark = pytest.mark.usefixtures("importing")
 
@@ -67,7 +66,7 @@ def test_lines_before_the_table_are_left_out(
         assert grasp_set.joint_names == FINGERS[:4]
         said = capsys.readouterr().out
     else:
-        assert "no column tells which rows are frames of one trial" in refused(capsys, "t.txt", "--yes")
+        assert "no column tells which rows are frames of one trial" in refused("t.txt", "--yes")
     lines = PREFACES[kind].count("\n")
     assert (f"skip = {lines}\n" in columns_toml().read_text()) is bool(lines)
     assert ("rows left out at the top" in said) is bool(lines and header)
@@ -128,7 +127,7 @@ def wide_codes() -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", LISTS)
-def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lists_in_cells_become_columns(kind: str) -> None:
     table = pd.DataFrame(
         [[row[0], row[1], LISTS[kind](row[2:])] for row in rows(3)], columns=["grasp", "trial", "data"]
     )
@@ -138,7 +137,7 @@ def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[
     assert np.array_equal(grasp_set.codes, wide_codes())
 
 
-def test_so_do_lists_of_spreadsheets_data_frames_and_parquet(capsys: pytest.CaptureFixture[str]) -> None:
+def test_so_do_lists_of_spreadsheets_data_frames_and_parquet() -> None:
     lists = pd.DataFrame(
         [[row[0], int(row[1]), [float(cell) for cell in row[2:]]] for row in rows(3)],
         columns=["grasp", "trial", "data"],
@@ -171,17 +170,16 @@ ODDITIES = {
 
 
 @pytest.mark.parametrize("text", ODDITIES, ids=range(len(ODDITIES)))
-def test_the_error_names_the_first_oddity(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_error_names_the_first_oddity(text: str) -> None:
     Path("t.csv").write_text(text)
-    assert ODDITIES[text] in refused(capsys, "t.csv", "--yes")
+    assert ODDITIES[text] in refused("t.csv", "--yes")
 
 
-def test_a_column_with_a_broken_cell_is_left_out_by_its_row(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_column_with_a_broken_cell_is_left_out_by_its_row() -> None:
     broken = "grasp,trial,a,b\nA,1,0,1.5\nB,1,x,2.5\nA,2,1,3\nB,2,1,4\n"
     Path("t.csv").write_text(broken)
-    assert run(["import", "t.csv", "-o", "t.grasps", "--yes"]) == 0
-    told = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    told = " ".join(works("import", "t.csv", "-o", "t.grasps", "--yes").stdout.replace("│", " ").split())
     assert "a left out row 3 has 'x' in column 'a', which holds numbers elsewhere: correct the cell" in told
     Path("t.csv").write_text(broken.replace("grasp", "kind"))
-    assert run(["import", "t.csv", "-o", "t.grasps", "--yes", "--overwrite"]) == 0
-    assert "kind label" in " ".join(capsys.readouterr().out.replace("│", " ").split())
+    done = works("import", "t.csv", "-o", "t.grasps", "--yes", "--overwrite")
+    assert "kind label" in " ".join(done.stdout.replace("│", " ").split())
