@@ -16,8 +16,8 @@ from thenar.runtime.live import checkup, stream_probe
 
 from ..drivers import bumble_backend
 from ..drivers.test_encodings import FLEXION, nmea
+from ..sending import sending
 from .conftest import thenar, works
-from .test_streams import sending
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 NESTED, PLAIN = [f"flex.{number}" for number in range(5)], ["c1", "c2", "c3", "c4", "c5"]

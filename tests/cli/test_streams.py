@@ -7,9 +7,8 @@ import pty
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from threading import Event, Thread
+from threading import Event
 from time import monotonic
 
 import numpy as np
@@ -24,6 +23,7 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live import checkup
 from thenar.runtime.live.replay import replayed
 
+from ..sending import sending
 from ..sets import grasp_set_of
 from .conftest import refusal, thenar, works
 
@@ -42,25 +42,6 @@ PORTS = [
     "udp://0.0.0.0:3333",
     "-",
 ]
-
-
-@contextlib.contextmanager
-def sending(send: Callable[[int], object], every_s: float = 0.01) -> Iterator[None]:
-    """Call `send` with 1, 2 and so on in another thread, until the block ends."""
-    done = Event()
-
-    def go() -> None:
-        number = 0
-        while not done.wait(every_s):
-            send(number := number + 1)
-
-    thread = Thread(target=go)
-    thread.start()
-    try:
-        yield
-    finally:
-        done.set()
-        thread.join()
 
 
 def test_names_that_the_sender_gives_say_what_columns_are(tmp_path: Path) -> None:

@@ -139,6 +139,15 @@ def test_demonstrations_have_their_steps_in_common(build: Path, demos: list[Path
     ]
 
 
+def test_a_replayed_recording_takes_preshapes(build: Path, demos: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "gripper.toml").write_text(GRIPPER)
+    done = works("run", build, "--replay", demos[0], "--preshape", tmp_path / "gripper.toml", "--frames", 60)
+    assert "60 of 60 frames recognised as they were recorded" in done.stderr
+    shapes = [json.loads(line)["preshape"] for line in done.stdout.splitlines()]
+    assert {shape["name"] for shape in shapes if shape} == {"wide"}
+    assert len(shapes) == 60
+
+
 def test_what_teaches_nothing_is_refused(build: Path, set_file: Path, tmp_path: Path) -> None:
     empty = record(build, tmp_path / "empty.mcap", [3] * 80)
     grasps_of(np.array([0])).save(static := tmp_path / "static.grasps")

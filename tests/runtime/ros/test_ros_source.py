@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
-from threading import Event, Thread
 from types import ModuleType
 from typing import IO, Any
 
@@ -22,6 +21,8 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.ros import RosReader
 from thenar.runtime.sources.rows import RowSource
+
+from ...sending import sending
 
 DOMAIN = 78
 TALKER = Path(__file__).with_name("ros_talker.py")
@@ -131,23 +132,15 @@ def test_positions_of_a_joint_state_are_joints_by_their_names(hear: Hear) -> Non
 @pytest.mark.parametrize("kind", ["JointState", "Float32MultiArray"])
 def test_doctor_proposes_joints_for_a_joint_state_whatever_their_names_and_values(talk: Talk, kind: str) -> None:
     topic = _topic()
-    sending, done = talk(topic, kind), Event()
+    talking = talk(topic, kind)
 
-    def send() -> None:
-        for place in count():
-            positions = [float(place % 2), 0.25 * (place % 5), 0.5 if kind == "JointState" else 0.5 * (place % 2)]
-            stamped = {"stamp": [1_800_000_000, place], "name": ["ring", "thumb", "fsr"], "position": positions}
-            sending.write(json.dumps(stamped if kind == "JointState" else positions) + "\n")
-            if done.wait(0.01):
-                return
+    def send(place: int) -> None:
+        positions = [float(place % 2), 0.25 * (place % 5), 0.5 if kind == "JointState" else 0.5 * (place % 2)]
+        stamped = {"stamp": [1_800_000_000, place], "name": ["ring", "thumb", "fsr"], "position": positions}
+        talking.write(json.dumps(stamped if kind == "JointState" else positions) + "\n")
 
-    sender = Thread(target=send)
-    sender.start()
-    try:
+    with sending(send):
         found = propose_stream(f"ros:{topic}?type={kind}", 115_200, 0.5).stream
-    finally:
-        done.set()
-        sender.join()
     if kind == "JointState":
         assert list(found.joints) == ["ring", "thumb", "fsr"]
         assert not found.switches
