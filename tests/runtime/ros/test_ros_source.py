@@ -15,14 +15,12 @@ import pytest
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.stream_probe import propose_stream
-from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.ros import RosReader
 from thenar.runtime.sources.rows import RowSource
 
 from ...sending import sending
+from ..conftest import row_source
 
 DOMAIN = 78
 TALKER = Path(__file__).with_name("ros_talker.py")
@@ -64,11 +62,7 @@ def hear(talk: Talk) -> Iterator[Hear]:
 
         def heard(kind: str, options: str, values: Any, text: str) -> tuple[RowSource, list[SwitchFrame | GloveFrame]]:
             topic = _topic()
-            harness = parse_harness(text.format(port=f"ros:{topic}{options}"), "glove.toml")
-            scan = whole_scan(harness, harness.switches, every_taxel=True)
-            made = [source for kind in SOURCES.values() for source in kind.sources(harness, harness.switches, scan)]
-            (source,) = made
-            assert isinstance(source, RowSource)
+            source = row_source(text.format(port=f"ros:{topic}{options}"))
             stack.callback(source.close)
             source.open()
             sending = talk(topic, kind)
@@ -87,9 +81,7 @@ def hear(talk: Talk) -> Iterator[Hear]:
 
 def test_messages_of_a_second_publisher_are_left_out_and_said(talk: Talk) -> None:
     topic = _topic()
-    harness = parse_harness(f'[[stream]]\nport = "ros:{topic}"\njoints = {{ ring = [1, 255] }}\n', "glove.toml")
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, (), whole_scan(harness, ())))
-    assert isinstance(source, RowSource)
+    source = row_source(f'[[stream]]\nport = "ros:{topic}"\njoints = {{ ring = [1, 255] }}\n')
     source.open()
     try:
         first, second = talk(topic, "JointState"), talk(topic, "JointState")
