@@ -24,7 +24,7 @@ from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
 
 from ..sets import grasp_set_of
-from .conftest import refusal
+from .conftest import refusal, thenar
 from .test_adapt_command import BARE
 from .test_record_command import GLOVE
 
@@ -155,7 +155,9 @@ def test_a_glove_that_does_not_fit_is_refused_before_any_trial(
 ) -> None:
     whole = re.sub(pattern, other, (folder / "glove.toml").read_text())
     (folder / "glove.toml").write_text(whole)
-    assert said in refusal("wear", folder / "build", "--glove", folder / "glove.toml", "-o", folder / "mine")
+    done = thenar("wear", folder / "build", "--glove", folder / "glove.toml", "-o", folder / "mine")
+    assert done.returncode == 2
+    assert said in done.stderr
     assert not list(folder.glob("mine*"))
 
 
