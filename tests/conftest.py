@@ -10,7 +10,7 @@ import sys
 import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import Any, NoReturn
 
 import pytest
@@ -82,6 +82,17 @@ def weka() -> Callable[..., str]:
         return subprocess.run([*command, *arguments], check=True, capture_output=True, text=True).stdout
 
     return run
+
+
+def module_at(path: Path) -> ModuleType:
+    """Import the file at `path` by its name, wherever it is."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 def calls(work: Callable[[], object]) -> int:
@@ -309,11 +320,4 @@ def hostile_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
 @pytest.fixture(scope="session")
 def examples() -> Any:
     """Return the module with example_frontier, the made-up frontier for all tests that show one."""
-    path = Path(__file__).parent / "fuzz" / "example_frontier.py"
-    spec = importlib.util.spec_from_file_location("example_frontier", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return module_at(Path(__file__).parent / "fuzz" / "example_frontier.py")

@@ -4,7 +4,6 @@ import importlib.metadata as metadata
 import json
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import sysconfig
@@ -13,13 +12,13 @@ import tomllib
 import venv
 import zipfile
 from pathlib import Path
-from threading import Event, Thread
 
 import numpy as np
 import pytest
 
 from thenar.compiler import compile_build
 
+from .sending import datagrams, free_port
 from .sets import grasp_set_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -240,21 +239,10 @@ def test_the_commands_for_a_raspberry_pi_run_with_the_base_dependencies(board: P
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "thenar").write_text(f'#!/bin/sh\nexec {board} -I -m thenar.cli "$@"\n')
     (tmp_path / "bin" / "thenar").chmod(0o755)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as glove:
-        glove.bind(("127.0.0.1", 0))
-        port = glove.getsockname()[1]
-    names, done = json.dumps(grasps.switch_names), Event()
+    names, port = json.dumps(grasps.switch_names), free_port()
     row = json.dumps(dict.fromkeys(grasps.switch_names, 1)).encode()
     (tmp_path / "glove.toml").write_text(f'[[stream]]\nport = "udp://127.0.0.1:{port}"\nswitches = {names}\n')
-
-    def send() -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            while not done.wait(0.02):
-                sender.sendto(row, ("127.0.0.1", port))
-
-    sending = Thread(target=send)
-    sending.start()
-    try:
+    with datagrams(port, lambda _number: row, 0.02):
         lines = [line for block in re.findall("```sh\n(.*?)```", page, re.DOTALL) for line in block.splitlines()]
         commands = [line for line in lines if not line.startswith(OF_THE_PI) and "pip install" not in line]
         assert len(commands) == 5
@@ -263,7 +251,4 @@ def test_the_commands_for_a_raspberry_pi_run_with_the_base_dependencies(board: P
             run = ["sh", "-c", line.removeprefix("sudo ") + below]
             ended = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
             assert ended.returncode == 0, (line, ended.stdout, ended.stderr)
-    finally:
-        done.set()
-        sending.join()
     assert "@" not in (tmp_path / "root" / "etc" / "systemd" / "system" / "thenar.service").read_text()

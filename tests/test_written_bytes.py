@@ -43,19 +43,24 @@ def kept(name: str, written: dict[str, str], update: bool) -> None:
         assert written == golden[name]
 
 
+def digest(written: object) -> str:
+    return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+
+
+def contents(build: Path) -> Iterator[tuple[str, str]]:
+    """Yield each file of a build and its digest; of its firmware, of which a folder stands in golden/firmware, one."""
+    yield from ((f"{build.name}/{name}", found) for name, found in digests(build) if not name.startswith("firmware/"))
+    yield f"{build.name}/firmware", digest(dict(digests(build / "firmware")))
+
+
 def builds_of(grasps: Path, glove: Path, folder: Path) -> dict[str, str]:
-    """Compile `grasps` with sums of 16 bits and a wiring, and lines of 8 bits; return the digest of each file."""
+    """Compile `grasps` with sums of 16 bits and a wiring, and lines of 8 bits; return the digests."""
     whole, small = folder / "whole", folder / "small"
     common = ["compile", str(grasps), "--folds", "0", "--no-report"]
     assert run([*common, "-o", str(whole), "--glove", str(glove), "--rounds", "10"]) == 0
     assert run([*common, "-o", str(small), "--trainer", "linear", "--table-bits", "8"]) == 0
-    return {"set.grasps": hashlib.sha256(grasps.read_bytes()).hexdigest()} | {
-        f"{build.name}/{name}": digest for build in (whole, small) for name, digest in digests(build)
-    }
-
-
-def digest(written: object) -> str:
-    return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+    found = {"set.grasps": hashlib.sha256(grasps.read_bytes()).hexdigest()}
+    return found | dict(contents(whole)) | dict(contents(small))
 
 
 def results_of(grasps: Path, glove: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:

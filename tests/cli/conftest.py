@@ -46,6 +46,20 @@ def thenar(*arguments: object) -> "subprocess.CompletedProcess[str]":
         return subprocess.CompletedProcess(words, code, out.read_text("utf-8"), err.read_text("utf-8"))
 
 
+def works(*arguments: object) -> "subprocess.CompletedProcess[str]":
+    """Run `thenar`, which does as it is told."""
+    done = thenar(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def refusal(*arguments: object) -> str:
+    """Return why `thenar` refuses: the user is mistaken, and nothing was printed but what is wrong."""
+    done = thenar(*arguments)
+    assert (done.returncode, done.stdout, "Traceback" in done.stderr) == (2, "", False), done.stderr
+    return done.stderr
+
+
 @pytest.fixture(scope="session")
 def small_set() -> GraspSet:
     random = np.random.default_rng(4)
@@ -114,10 +128,9 @@ def imported(*arguments: str, output: str = "set.grasps") -> GraspSet:
     return GraspSet.load(output)
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """Return the sentence by which an import is refused."""
-    capsys.readouterr()
-    assert run(["import", *arguments, "-o", "set.grasps", "--overwrite"]) == 2
-    said = capsys.readouterr().err
-    assert (said[:8], said.count("\n"), "Traceback" in said) == ("thenar: ", 1, False)
+def refused(*arguments: str) -> str:
+    """Return the sentence by which an import is refused, after what it has found."""
+    done = thenar("import", *arguments, "-o", "set.grasps", "--overwrite")
+    said = done.stderr
+    assert (done.returncode, said[:8], said.count("\n"), "Traceback" in said) == (2, "thenar: ", 1, False)
     return said

@@ -16,8 +16,8 @@ from thenar.runtime.live import checkup, stream_probe
 
 from ..drivers import bumble_backend
 from ..drivers.test_encodings import FLEXION, nmea
-from .conftest import thenar
-from .test_streams import sending
+from ..sending import sending
+from .conftest import thenar, works
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 NESTED, PLAIN = [f"flex.{number}" for number in range(5)], ["c1", "c2", "c3", "c4", "c5"]
@@ -63,8 +63,7 @@ def test_doctor_finds_how_rows_are_written_and_its_proposal_reads_them(
         bumble_backend.use(monkeypatch, peripheral.hci)
         send, port = (peripheral.send, "ble://lucid") if "Bluetooth" in encoding else (line.send, line.link)
         with sending(lambda number: send(write(number).encode("latin-1"))):
-            done = thenar("doctor", "--line", port, "--seconds", "1.5", "--propose", path, "--json")
-            assert done.returncode == 0, done.stderr
+            done = works("doctor", "--line", port, "--seconds", "1.5", "--propose", path, "--json")
             (rows,) = [one for one in json.loads(thenar("doctor", path, "--json").stdout) if not one["part"]]
     stream, timed = load_harness(path).streams[0], encoding == "times"
     assert list(stream.taxels or stream.joints) == [f"c{name}" if timed else name for name in moving]

@@ -17,7 +17,7 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.calibration import load_calibration
 
-from .conftest import thenar
+from .conftest import refusal, thenar
 
 # Dialogues over a pty, in real time.
 pytestmark = pytest.mark.slow
@@ -228,6 +228,4 @@ def test_missing_port_and_wrong_baud_rate_are_reported_in_a_sentence(tmp_path: P
     assert (done.returncode, done.stdout) == (2, "")
     assert re.fullmatch(r"thenar: .*/none: there is no such port: .*\n", done.stderr)
     for baud in ("fast", "0", "-3", "99999999999"):
-        done = thenar("calibrate", "x", "-o", tmp_path / "a.toml", "--baud", baud)
-        assert done.returncode == 2
-        assert "--baud" in done.stderr
+        assert "--baud" in refusal("calibrate", "x", "-o", tmp_path / "a.toml", "--baud", baud)

@@ -14,7 +14,7 @@ from thenar.compiler.evaluation.rates import paired_interval
 from thenar.compiler.samples import select_inputs
 
 from ..compiler.conftest import make_set, with_none
-from .conftest import thenar
+from .conftest import refusal, thenar, works
 
 # Trials of several frames, some of nothing held, of two subjects.
 MADE = make_set(rows=240)
@@ -36,8 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def compared(folder: Path, a: str, b: str, grasp_set: str) -> dict[str, Any]:
-    done = thenar("compare", folder / a, folder / b, folder / grasp_set, "--json")
-    assert done.returncode == 0, done.stderr
+    done = works("compare", folder / a, folder / b, folder / grasp_set, "--json")
     found: dict[str, Any] = json.loads(done.stdout)
     return found
 
@@ -111,9 +110,9 @@ def test_rows_of_nothing_held_count_in_no_accuracy(folder: Path) -> None:
 
 
 def test_a_set_that_lacks_inputs_of_a_build_is_refused_with_the_name_of_the_build(folder: Path) -> None:
-    done = thenar("compare", folder / "b", folder / "a", folder / "other.grasps")
-    assert done.returncode == 2
-    assert f"{folder / 'a'}: the recordings lack" in done.stderr
+    assert f"{folder / 'a'}: the recordings lack" in refusal(
+        "compare", folder / "b", folder / "a", folder / "other.grasps"
+    )
 
 
 def test_the_interval_covers_the_difference_as_often_as_it_says() -> None:

@@ -11,7 +11,7 @@ from thenar.drivers.emulated.cyberglove import Doubts, EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.live import checkup, stream_probe
 
-from .conftest import thenar
+from .conftest import refusal, thenar, works
 
 NAMES = ["j0", "j1", *SENSORS_18[2:]]
 
@@ -38,8 +38,7 @@ def calibrated(harness: Path, *joints: str) -> None:
 
 def test_doctor_measures_records_as_fast_as_they_come_against_the_formula(harness: Path) -> None:
     harness.write_text(harness.read_text() + "rate_hz = 10\n")
-    done = thenar("doctor", harness, "--json")
-    assert done.returncode == 0, done.stderr
+    done = works("doctor", harness, "--json")
     (found,) = json.loads(done.stdout)
     assert found["present"]
     assert round(found["predicted_us"]) == 6323
@@ -53,8 +52,7 @@ def test_a_box_without_a_mask_is_found(
     build = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs="joints").folder
     calibrated(harness, "j0", "j1")
     glove.box.doubts = Doubts(mask="ignored")
-    done = thenar("doctor", harness, "--build", build)
-    assert done.returncode == 0, done.stderr
+    done = works("doctor", harness, "--build", build)
     assert "it accepts no sensor mask" in " ".join(done.stdout.split())
 
 
@@ -72,9 +70,7 @@ def test_a_port_that_writes_to_a_file_is_refused(tmp_path: Path, table: str) -> 
     path, victim = tmp_path / "glove.toml", tmp_path / "victim"
     victim.write_text("kept")
     path.write_text(table.format(f'"spy:///dev/null?file={victim}"'))
-    done = thenar("doctor", path)
-    assert done.returncode == 2
-    assert "port: 'spy:///dev/null?file=" in done.stderr
+    assert "port: 'spy:///dev/null?file=" in refusal("doctor", path)
     path.write_text(table.format(f'"{victim}"'))
     assert thenar("doctor", path).returncode == 1
     assert victim.read_text() == "kept"
@@ -94,15 +90,12 @@ def test_what_a_build_needs_of_the_calibration_is_found(small_set: GraspSet, har
     assert done.returncode == 1
     assert "calibrate it (`thenar calibrate`)" in done.stdout
     calibrated(harness, "j0", "j1")
-    done = thenar("doctor", harness, "--build", build)
-    assert done.returncode == 0, done.stdout
+    works("doctor", harness, "--build", build)
 
 
 def test_a_harness_without_devices_is_refused(tmp_path: Path) -> None:
     (tmp_path / "glove.toml").write_text("")
-    done = thenar("doctor", tmp_path / "glove.toml")
-    assert done.returncode == 2
-    assert "glove.toml names no device" in done.stderr
+    assert "glove.toml names no device" in refusal("doctor", tmp_path / "glove.toml")
 
 
 @pytest.mark.usefixtures("glove")
@@ -111,22 +104,16 @@ def test_the_proposal_for_a_cyberglove_is_one_that_doctor_accepts(
 ) -> None:
     monkeypatch.setattr(checkup, "_LISTEN_S", 0.3)
     line, proposal = f"cyberglove:{tmp_path}/port", tmp_path / "found.toml"
-    few = thenar("doctor", "--line", line, "--seconds", "0.5", "--names", "a,b")
-    assert few.returncode == 2
-    assert "2 columns are named, but rows have 18" in " ".join(few.stderr.split())
-    done = thenar(
-        "doctor", "--line", line, "--seconds", "0.5", "--names", ",".join(NAMES), "--json", "--propose", proposal
-    )
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    listening = ("doctor", "--line", line, "--seconds", "0.5", "--names")
+    assert "2 columns are named, but rows have 18" in refusal(*listening, "a,b")
+    found = json.loads(works(*listening, ",".join(NAMES), "--json", "--propose", proposal).stdout)
     assert [one["column"] for one in found["columns"]] == NAMES
     assert "did not move: press every pad and bend every finger" in " ".join(found["remarks"])
-    assert thenar("doctor", proposal).returncode == 0
+    works("doctor", proposal)
 
 
 @pytest.mark.usefixtures("glove")
 def test_silence_on_a_serial_port_hints_at_a_cyberglove(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream_probe, "_PATIENCE_US", 500_000)
-    done = thenar("doctor", "--line", f"{tmp_path}/port", "--seconds", "0.5")
-    assert done.returncode == 2
-    assert f"of a CyberGlove, the port is cyberglove:{tmp_path}/port" in "".join(done.stderr.split("\n"))
+    said = refusal("doctor", "--line", f"{tmp_path}/port", "--seconds", "0.5")
+    assert f"of a CyberGlove, the port is cyberglove:{tmp_path}/port" in said

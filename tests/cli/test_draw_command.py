@@ -9,6 +9,8 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.body.layout import murakami160
 
+from .conftest import refusal
+
 NAMES = tuple(patch.name for patch in murakami160())
 
 
@@ -55,7 +57,7 @@ def test_contacts_are_drawn_together_and_by_type(
 
 
 def test_a_placement_a_build_and_lists_are_drawn_side_by_side(
-    glove_file: Path, glove_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    glove_file: Path, glove_set: GraspSet, tmp_path: Path
 ) -> None:
     placement, listed, text = tmp_path / "a.json", tmp_path / "listed.json", tmp_path / "names.txt"
     assert run(["place", str(glove_file), "--method", "id3", "-o", str(placement)]) == 0
@@ -72,12 +74,10 @@ def test_a_placement_a_build_and_lists_are_drawn_side_by_side(
     assert all(f"<!-- {title}" in drawn for title in ("a", "build", "listed", "names"))
 
 
-def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
-    set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(set_file: Path, tmp_path: Path) -> None:
     for options in ([], ["--per-grasp"]):
-        assert run(["draw", str(set_file), *options, "-o", str(tmp_path / "no.svg")]) == 2
-        assert "the position of switch 's0' is unknown: say it with --layout" in capsys.readouterr().err
+        said = refusal("draw", set_file, *options, "-o", tmp_path / "no.svg")
+        assert "the position of switch 's0' is unknown: say it with --layout" in said
     assert not (tmp_path / "no.svg").exists()
 
 
@@ -96,12 +96,9 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
         (b"palm_heel_1\npalm_heel_1", "switch 'palm_heel_1' is kept twice"),
     ],
 )
-def test_a_file_that_lists_no_switches_is_refused_with_the_reason(
-    content: bytes, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_that_lists_no_switches_is_refused_with_the_reason(content: bytes, reason: str, tmp_path: Path) -> None:
     (tmp_path / "kept.txt").write_bytes(content)
-    assert run(["draw", "--kept", str(tmp_path / "kept.txt"), "-o", str(tmp_path / "no.svg")]) == 2
-    assert reason in capsys.readouterr().err
+    assert reason in refusal("draw", "--kept", tmp_path / "kept.txt", "-o", tmp_path / "no.svg")
 
 
 @pytest.mark.parametrize(
@@ -115,17 +112,15 @@ def test_a_file_that_lists_no_switches_is_refused_with_the_reason(
     ],
 )
 def test_a_mistake_is_one_sentence_and_code_two(
-    glove_file: Path, options: list[str], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    glove_file: Path, options: list[str], reason: str, tmp_path: Path
 ) -> None:
     words = [str(glove_file) if word == "GRASPS" else word for word in options]
     output = [] if "-o" in words else ["-o", str(tmp_path / "no.svg")]
-    assert run(["draw", *words, *output]) == 2
-    assert reason in capsys.readouterr().err
+    assert reason in refusal("draw", *words, *output)
 
 
-def test_nothing_that_is_read_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_that_is_read_is_written_over(tmp_path: Path) -> None:
     listed = tmp_path / "kept.svg"
     listed.write_text(NAMES[0])
-    assert run(["draw", "--kept", str(listed), "-o", str(listed), "--overwrite"]) == 2
-    assert "is named twice" in capsys.readouterr().err
+    assert "is named twice" in refusal("draw", "--kept", listed, "-o", listed, "--overwrite")
     assert listed.read_text() == NAMES[0]

@@ -8,6 +8,7 @@ from thenar.cli import run
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 
 from ..sets import grasp_set_of
+from .conftest import refusal, works
 
 pytestmark = pytest.mark.usefixtures("one_way_to_train")
 QUICK = ("--rounds", "2", "--repeats", "1", "--jobs", "1")
@@ -56,14 +57,11 @@ def test_the_papers_tables_are_printed_with_both_protocols_explained(
     assert not complaints
 
 
-def test_every_table_names_its_method_and_its_trainer_with_their_settings(
-    grasps: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_every_table_names_its_method_and_its_trainer_with_their_settings(grasps: str, tmp_path: Path) -> None:
     tables = "compositions,pruning,baselines"
     logit = ("--trainer", "logit", "--penalty", "2", "--smoothness", "3", "--prune", "4")
     asked = ("--repeats", "1", "--jobs", "1", "--tables", tables, "--protocol", "nested")
-    assert run(["evaluate", grasps, *asked, *logit, "-o", str(tmp_path / "result.json")]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
+    printed = " ".join(works("evaluate", grasps, *asked, *logit, "-o", tmp_path / "result.json").stdout.split())
     methods = {
         "compositions": "id3, S = 4",
         "pruning": "id3, S of the row, all subjects pooled",
@@ -80,8 +78,8 @@ def test_every_table_names_its_method_and_its_trainer_with_their_settings(
 
 
 def test_every_rate_has_its_interval_in_percent(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper", "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)["tables"][0]["rows"][0]
+    done = works("evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper", "--json")
+    result = json.loads(done.stdout)["tables"][0]["rows"][0]
     rate = result["cells"][0]["rate"]
     assert run(["evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper"]) == 0
     expected = f"{100 * rate['mean']:.1f} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"
@@ -94,14 +92,11 @@ def test_every_rate_has_its_interval_in_percent(grasps: str, capsys: pytest.Capt
     assert last != expected
 
 
-def test_json_on_stdout_and_in_the_file_are_one_document(
-    grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_on_stdout_and_in_the_file_are_one_document(grasps: str, tmp_path: Path) -> None:
     output = tmp_path / "result.json"
     arguments = ["--prune", "3", "--prune-list", "5, 0,5", "--seed", "7", "--subject", "Ann"]
     arguments += ["--tables", "pruning, generality,compositions"]
-    assert run(["evaluate", grasps, *QUICK, *arguments, "--json", "-o", str(output)]) == 0
-    result = json.loads(capsys.readouterr().out)
+    result = json.loads(works("evaluate", grasps, *QUICK, *arguments, "--json", "-o", output).stdout)
     assert result == json.loads(output.read_text())
     recipe = {"prune": 3, "seed": 7, "rounds": 2, "trainer": "logitboost"}
     assert recipe.items() <= result["options"].pop("recipe").items()
@@ -111,14 +106,13 @@ def test_json_on_stdout_and_in_the_file_are_one_document(
     assert result["left_out"] == [{"name": "generality", "reason": "another's placement needs a second subject"}]
 
 
-def test_other_cuts_say_what_they_are(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", grasps, *QUICK, "--by", "subject", "--tables", "compositions"]) == 0
-    assert "one subject left out" in capsys.readouterr().out
+def test_other_cuts_say_what_they_are(grasps: str) -> None:
+    done = works("evaluate", grasps, *QUICK, "--by", "subject", "--tables", "compositions")
+    assert "one subject left out" in done.stdout
 
 
-def test_a_composition_without_inputs_is_marked_and_explained(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", grasps, *QUICK, "--prune", "1000", "--tables", "compositions"]) == 0
-    printed = capsys.readouterr().out
+def test_a_composition_without_inputs_is_marked_and_explained(grasps: str) -> None:
+    printed = works("evaluate", grasps, *QUICK, "--prune", "1000", "--tables", "compositions").stdout
     assert "the most frequent grasp type is predicted" in printed
     assert any("VI " in line and "]*" in line for line in printed.splitlines())
 
@@ -153,18 +147,16 @@ def test_a_users_mistake_ends_with_2_and_a_sentence(
     assert "Traceback" not in complaints
 
 
-def test_trainers_are_compared_in_a_table(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", grasps, *QUICK, "--folds", "2", "--tables", "trainers", "--protocol", "nested"]) == 0
-    printed = capsys.readouterr().out
+def test_trainers_are_compared_in_a_table(grasps: str) -> None:
+    printed = works("evaluate", grasps, *QUICK, "--folds", "2", "--tables", "trainers", "--protocol", "nested").stdout
     for text in ("against logitboost", "discriminant", "linear", "logit ", "pairs", ", p "):
         assert text in printed
 
 
-def test_the_recipe_of_the_tables_is_the_one_that_is_asked_for(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_recipe_of_the_tables_is_the_one_that_is_asked_for(grasps: str) -> None:
     tables = ["--tables", "compositions,baselines,pruning", "--protocol", "nested", "--jobs", "1", "--repeats", "1"]
     recipe = ["--method", "elimination", "--keep", "2", "--never", "s0", "--trainer", "auto", "--rounds", "2"]
-    assert run(["evaluate", grasps, *tables, *recipe, "--json"]) == 0
-    study = json.loads(capsys.readouterr().out)
+    study = json.loads(works("evaluate", grasps, *tables, *recipe, "--json").stdout)
     compositions, baselines = study["tables"]
     assert compositions["recipe"]["method"] == "elimination, keep 2, without s0"
     assert compositions["recipe"]["trainer"] == "chosen from the training rows"
@@ -173,5 +165,4 @@ def test_the_recipe_of_the_tables_is_the_one_that_is_asked_for(grasps: str, caps
     assert [row["name"] for row in baselines["rows"]] == ["elimination", "CMIM", "top-k", "random"]
     (missing,) = study["left_out"]
     assert missing["name"] == "pruning"
-    assert run(["evaluate", grasps, "--streams", "--never", "s0"]) == 2
-    assert "--never is not for --streams" in capsys.readouterr().err
+    assert "--never is not for --streams" in refusal("evaluate", grasps, "--streams", "--never", "s0")

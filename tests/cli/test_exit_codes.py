@@ -12,7 +12,7 @@ import pytest
 from thenar.cli.group import COMMANDS
 from thenar.drivers.extras import EXTRAS
 
-from .conftest import thenar
+from .conftest import thenar, works
 
 HEAVY = ("sklearn", "scipy", "joblib", "matplotlib", "numpy")
 
@@ -27,8 +27,7 @@ def _one_sentence(done: "subprocess.CompletedProcess[str]") -> str:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help_with_an_example(command: str) -> None:
-    done = thenar(command, "--help")
-    assert done.returncode == 0, done.stderr
+    done = works(command, "--help")
     assert re.search(rf"^ +thenar {command} ", done.stdout.split("Example:")[1], re.MULTILINE)
 
 

@@ -7,6 +7,8 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet
 
+from .conftest import works
+
 
 @pytest.mark.parametrize("suffix", ["csv", "csv.gz", "tsv", "tsv.gz", "parquet"])
 @pytest.mark.parametrize("flags", [[], ["--codes"]])
@@ -17,10 +19,10 @@ def test_an_exported_table_imports_again(grasps: Path, suffix: str, flags: list[
     assert GraspSet.load(again).fingerprint() == GraspSet.load(grasps).fingerprint()
 
 
-def test_machines_are_told_what_was_written(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_machines_are_told_what_was_written(grasps: Path) -> None:
     table = grasps.with_name("t.csv")
-    assert run(["export", str(grasps), "-o", str(table), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"output": str(table), "columns": None, "trials": 4, "frames": 4}
+    done = works("export", grasps, "-o", table, "--json")
+    assert json.loads(done.stdout) == {"output": str(table), "columns": None, "trials": 4, "frames": 4}
 
 
 def test_values_are_written_unless_codes_are_asked_for(grasps: Path) -> None:

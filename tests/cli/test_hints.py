@@ -6,10 +6,11 @@ import click
 import pytest
 from click.shell_completion import ShellComplete
 
-from thenar.cli import run
 from thenar.cli.group import COMMANDS, thenar
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.trainers.base import TRAINERS
+
+from .conftest import refusal, works
 
 
 @pytest.mark.parametrize(
@@ -37,37 +38,32 @@ def test_a_typo_is_answered_with_the_nearest_name(
     set_file: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run(line.format(set=set_file).split()) == 2
-    said = capsys.readouterr().err
+    said = refusal(*line.format(set=set_file).split())
     assert "id you mean " in said
     assert f"'{nearest}'" in said.partition("id you mean ")[2]
     assert said.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_where_nothing_is_near_all_names_are_listed(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["place", str(set_file), "--method", "foo"]) == 2
-    assert f"there is no method 'foo': choose one of {', '.join(METHODS)}." in capsys.readouterr().err
+def test_where_nothing_is_near_all_names_are_listed(set_file: Path) -> None:
+    said = refusal("place", set_file, "--method", "foo")
+    assert f"there is no method 'foo': choose one of {', '.join(METHODS)}." in said
 
 
-def test_an_unknown_target_is_answered_with_the_general_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_target_is_answered_with_the_general_one() -> None:
     for wrong, said in (("rp2400", "(did you mean 'rp2040'"), ("z80", ": choose one of host, avr328p")):
-        assert run(["firmware", ".", "--target", wrong, "-o", "new"]) == 2
-        line = capsys.readouterr().err
+        line = refusal("firmware", ".", "--target", wrong, "-o", "new")
         assert f"there is no target '{wrong}'" in line
         assert said in line
         assert "Use `generic` for any other part with a C99 compiler" in line
 
 
-def test_help_is_a_command_too(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_is_a_command_too() -> None:
     for words, command in ((["help"], []), (["help", "place"], ["place"])):
-        assert run(words) == 0
-        asked = capsys.readouterr().out
-        assert run([*command, "--help"]) == 0
-        assert capsys.readouterr().out == asked
+        asked = works(*words).stdout
+        assert works(*command, "--help").stdout == asked
 
 
 def completed(*words: str) -> list[str]:

@@ -13,6 +13,8 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
+from .conftest import works
+
 TABLE = "label,who,s1,s2,j1\nmug,A,0,0,10.2\nball,A,1,0,20\nmug,B,0,0,30\nball,B,1,0,\n"
 COLUMNS = """label = "label"
 subject = "who"
@@ -141,14 +143,13 @@ def test_a_table_is_imported_without_a_columns_toml(glove: Path, capsys: pytest.
     assert sorted(path.name for path in glove.glob("*.toml")) == ["set.columns.toml"]
 
 
-def test_a_stream_with_rest_is_imported_as_it_comes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stream_with_rest_is_imported_as_it_comes(tmp_path: Path) -> None:
     runs = [("rest", 30), ("cup", 50), ("rest", 40), ("pen", 60), ("rest", 20)] * 2
     labels = [label for label, count in runs for _ in range(count)]
     poses = {"rest": 10, "cup": 80, "pen": 50}
     rows = [f"{n / 100},{label},{poses[label] + n % 7}.5\n" for n, label in enumerate(labels)]
     (tmp_path / "stream.csv").write_text("t,label,bend\n" + "".join(rows))
-    assert run(["import", str(tmp_path / "stream.csv"), "-o", str(tmp_path / "set.grasps"), "--yes"]) == 0
-    said = capsys.readouterr().out
+    said = works("import", tmp_path / "stream.csv", "-o", tmp_path / "set.grasps", "--yes").stdout
     assert "nothing is held where the label is 'rest' (45% of the rows): see `none`" in said
     assert "9 trials (4 grasps, 5 rests) of 400 frames, 2 grasp types (own); subjects 1" in said
     assert 'none = "rest"' in (tmp_path / "set.columns.toml").read_text()
@@ -205,8 +206,7 @@ def test_who_states_that_rows_are_independent_is_asked_for_it(
     assert run(["compile", "set.grasps", "-o", "build", "--folds", "0", "--rounds", "2"]) == 0
     capsys.readouterr()
     for line in (["info", "set.grasps"], ["verify", "build", "set.grasps"]):
-        assert run(line) == 0
-        assert INDEPENDENT in capsys.readouterr().out.splitlines()
+        assert INDEPENDENT in works(*line).stdout.splitlines()
     assert 'frames = "independent"' in (glove / "set.columns.toml").read_text()
     asked(monkeypatch, "n")
     assert run(["import", "rows.csv", "-o", "no.grasps"]) == 2

@@ -14,7 +14,7 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet
 
-from .conftest import columns_toml, imported, refused
+from .conftest import columns_toml, imported, refused, works
 
 pytestmark = pytest.mark.usefixtures("importing")
 
@@ -131,7 +131,7 @@ def test_numbers_of_trials_in_the_files_are_of_one_file() -> None:
     assert len(np.unique(imported("{subject}_{session}.csv").sessions)) == 2
 
 
-def test_spreadsheets_are_read_as_well(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_spreadsheets_are_read_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     for path in write("{label}/{subject}_{trial}.xlsx"):
         if "2" in path.stem or "10" in path.stem:
             path.unlink()
@@ -142,14 +142,12 @@ def test_spreadsheets_are_read_as_well(capsys: pytest.CaptureFixture[str], monke
     crash.chmod(0o755)
     with monkeypatch.context() as patch:
         patch.setattr(sys, "executable", str(crash.absolute()))
-        said = refused(capsys, "{label}/{subject}_{trial}.xlsx", "--yes")
+        said = refused("{label}/{subject}_{trial}.xlsx", "--yes")
         assert said.startswith("thenar: pen/ben_1.xlsx: its reader gave up: the file is damaged")
     Path("pen/ben_1.xlsx").write_bytes(b"PK no spreadsheet")
-    assert "pen/ben_1.xlsx: cannot be read as a spreadsheet" in refused(
-        capsys, "{label}/{subject}_{trial}.xlsx", "--yes"
-    )
+    assert "pen/ben_1.xlsx: cannot be read as a spreadsheet" in refused("{label}/{subject}_{trial}.xlsx", "--yes")
     Path("cup/anna_7.csv").write_text("f1,f2\n1,2\n")
-    assert "matches files of several kinds, .csv, .xlsx: name one" in refused(capsys, "{label}/{subject}_{trial}.*")
+    assert "matches files of several kinds, .csv, .xlsx: name one" in refused("{label}/{subject}_{trial}.*")
 
 
 def test_faults_name_the_file_and_the_row(capsys: pytest.CaptureFixture[str]) -> None:
@@ -163,50 +161,50 @@ def test_faults_name_the_file_and_the_row(capsys: pytest.CaptureFixture[str]) ->
         ("", "key/ben_2.csv has no rows"),
     ):
         path.write_text(bad)
-        assert said in refused(capsys, PATTERN, "--yes")
+        assert said in refused(PATTERN, "--yes")
     lines = good.splitlines()
     path.write_text(good)
     imported(PATTERN)
     path.write_text("\n".join([*lines[:3], "0.02,oops,1", *lines[4:]]))
-    assert "1 cell, row 4 of key/ben_2.csv 'f1' ('oops')" in refused(capsys, PATTERN, "--columns", str(columns_toml()))
+    assert "1 cell, row 4 of key/ben_2.csv 'f1' ('oops')" in refused(PATTERN, "--columns", str(columns_toml()))
     path.write_text("\n".join([*lines[:3], "0.02,,1", *lines[4:]]))
     columns = columns_toml().read_text()
     columns_toml().write_text('missing = "drop"\n' + columns)
     capsys.readouterr()
-    assert run(["import", PATTERN, "-o", "set.grasps", "--overwrite", "--columns", str(columns_toml()), "--json"]) == 0
-    dropped = json.loads(capsys.readouterr().out)["warnings"][0]
+    done = works("import", PATTERN, "-o", "set.grasps", "--overwrite", "--columns", str(columns_toml()), "--json")
+    dropped = json.loads(done.stdout)["warnings"][0]
     assert "row 4 of key/ben_2.csv (columns f1)" in dropped["message"]
     # In the table of all files: six rows each, key/ben is fourth of six, its second trial the eleventh file.
     assert dropped["rows"] == [6 * 10 + 3]
 
 
-def test_what_is_no_set_of_files_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_set_of_files_is_said() -> None:
     paths = write()
-    assert "no table matches data/{label}/{x}.tsv: next to them are" in refused(capsys, "data/{label}/{x}.tsv", "--yes")
-    assert "data/nowhere: No such file or directory" in refused(capsys, "data/nowhere/{x}.csv", "--yes")
-    assert "is a name in braces, such as {label}" in refused(capsys, "data/{}/{x}.csv", "--yes")
-    assert "has a column 'f1', as the pattern has" in refused(capsys, "data/{label}/{f1}.csv", "--yes")
-    assert "does not exist" in refused(capsys, "nowhere")
+    assert "no table matches data/{label}/{x}.tsv: next to them are" in refused("data/{label}/{x}.tsv", "--yes")
+    assert "data/nowhere: No such file or directory" in refused("data/nowhere/{x}.csv", "--yes")
+    assert "is a name in braces, such as {label}" in refused("data/{}/{x}.csv", "--yes")
+    assert "has a column 'f1', as the pattern has" in refused("data/{label}/{f1}.csv", "--yes")
+    assert "does not exist" in refused("nowhere")
     Path("data/cup/anna_3.csv").symlink_to("anna_1.csv")
-    assert "cup/anna_3.csv and cup/anna_1.csv are one file" in refused(capsys, PATTERN, "--yes")
+    assert "cup/anna_3.csv and cup/anna_1.csv are one file" in refused(PATTERN, "--yes")
     Path("data/cup/anna_3.csv").unlink()
     os.mkfifo("data/cup/anna_3.csv")
     Path("data/cup/anna_4.csv").symlink_to("nowhere")
     assert len(np.unique(imported(PATTERN).trial_ids)) == len(paths)
     Path("empty").mkdir()
-    assert "empty holds no tables (.csv, .tsv" in refused(capsys, "empty", "--yes")
+    assert "empty holds no tables (.csv, .tsv" in refused("empty", "--yes")
     # A file whose name has braces is a file.
     paths[0].rename("{label}.csv")
-    assert "no column looks like the grasp type" in refused(capsys, "{label}.csv", "--yes")
-    two = refused(capsys, "data/cup/anna_2.csv", "data/cup/ben_2.csv")
+    assert "no column looks like the grasp type" in refused("{label}.csv", "--yes")
+    two = refused("data/cup/anna_2.csv", "data/cup/ben_2.csv")
     assert "of tables with one trial each, name the pattern of their paths" in two
 
 
-def test_fields_cannot_leave_the_folder(capsys: pytest.CaptureFixture[str]) -> None:
+def test_fields_cannot_leave_the_folder() -> None:
     write()
     Path("other_1.csv").write_text("time,f1,f2\n0,1,2\n")
     assert len(np.unique(imported("data/*/{label}_{trial}.csv").trial_ids)) == 18
-    assert "no table matches" in refused(capsys, "data/{label}{x}_{trial}.csv", "--yes")
+    assert "no table matches" in refused("data/{label}{x}_{trial}.csv", "--yes")
 
 
 def test_a_stream_in_each_file_keeps_its_trials() -> None:

@@ -7,10 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thenar.cli import run
 from thenar.compiler import GraspSet
 
-from .conftest import imported, refused
+from .conftest import imported, refused, works
 
 pytestmark = pytest.mark.usefixtures("importing")
 
@@ -67,7 +66,7 @@ def test_files_of_one_trial_are_merged_by_time(joints: str, switches: str) -> No
     assert np.array_equal(ours.sort_values(order)[columns].to_numpy(), rows.sort_values(order)[columns].to_numpy())
 
 
-def test_tables_without_a_time_stand_row_by_row(capsys: pytest.CaptureFixture[str]) -> None:
+def test_tables_without_a_time_stand_row_by_row() -> None:
     columns = pd.DataFrame({"trial": np.repeat(np.arange(12), 5), "grasp": np.repeat([*POSES] * 4, 5)})
     values = np.random.default_rng(2).integers(0, 2, (60, 3))
     columns.assign(s1=values[:, 0]).to_csv("a.csv", index=False)
@@ -80,12 +79,12 @@ def test_tables_without_a_time_stand_row_by_row(capsys: pytest.CaptureFixture[st
     shuffled.set_axis(["s4", "s5", "trial"], axis="columns").to_excel("c.xlsx", index=False)
     assert imported("a.csv", "b.csv", "c.xlsx").switches.tolist() == values[:, [0, 1, 2, 1, 2]].astype(bool).tolist()
     shuffled.iloc[1:].to_csv("b.csv", index=False)
-    assert "a.csv and b.csv have 5 and 4 rows of the trial with row " in refused(capsys, "a.csv", "b.csv", "--yes")
+    assert "a.csv and b.csv have 5 and 4 rows of the trial with row " in refused("a.csv", "b.csv", "--yes")
     more[more["trial"] != 3].to_csv("b.csv", index=False)
-    assert "b.csv has no rows of the trial with row 17\n" in refused(capsys, "a.csv", "b.csv", "--yes")
+    assert "b.csv has no rows of the trial with row 17\n" in refused("a.csv", "b.csv", "--yes")
 
 
-def test_a_table_with_a_row_for_each_file_names_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_table_with_a_row_for_each_file_names_it() -> None:
     write_trials("d/S1_{subject}_{label}_{trial}.csv", "e/{subject}_{label}_{trial}.csv")
     names = [f"S1_{subject}_{label}_{trial}" for subject, label, trial in trials()]
     table = pd.DataFrame({"filename": names, "grasp": [label for _, label, _ in trials()]})
@@ -95,14 +94,14 @@ def test_a_table_with_a_row_for_each_file_names_it(capsys: pytest.CaptureFixture
         found = imported("d/S1_{subject}_*_{trial}.csv", "facts.csv")
         assert found.grasps.tolist() == by_path.grasps.tolist()
     table.iloc[:-1].to_csv("facts.csv", index=False)
-    said = refused(capsys, "d/S1_{subject}_*_{trial}.csv", "facts.csv", "--yes")
+    said = refused("d/S1_{subject}_*_{trial}.csv", "facts.csv", "--yes")
     assert "facts.csv has no rows of the trial with row 2 of S1_ben_tip_10.csv" in said
     table.assign(filename="else").to_csv("facts.csv", index=False)
-    said = refused(capsys, "d/S1_{subject}_*_{trial}.csv", "facts.csv", "--yes")
+    said = refused("d/S1_{subject}_*_{trial}.csv", "facts.csv", "--yes")
     assert "facts.csv has no rows of any trial of d/S1_{subject}_*_{trial}.csv, but of filename else" in said
 
 
-def test_numbers_of_labels_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_of_labels_are_named() -> None:
     """By [labels], also where they are written with decimals; or by a table of names."""
     labels = [number for number in range(3) for _ in range(12)]
     values = np.random.default_rng(4).normal(labels, 0.3).round(2)
@@ -111,19 +110,19 @@ def test_numbers_of_labels_are_named(capsys: pytest.CaptureFixture[str]) -> None
     Path("columns.toml").write_text(columns + '0 = "none"\n1 = "power"\n2 = "tip"\n')
     for kind in (int, float):
         frame.astype({"label": kind}).to_csv("t.csv", index=False)
-        assert run(["import", "t.csv", "-o", "set.grasps", "--columns", "columns.toml", "--overwrite"]) == 0
-        assert "entries of [labels]" not in capsys.readouterr().err
+        done = works("import", "t.csv", "-o", "set.grasps", "--columns", "columns.toml", "--overwrite")
+        assert "entries of [labels]" not in done.stderr
         assert np.unique(GraspSet.load("set.grasps").grasps).tolist() == ["none", "power", "tip"]
     frame.to_csv("t.csv", index=False)
     pd.DataFrame({"label": [0, 1, 2], "name": ["open", "power", "tip"]}).to_csv("names.csv", index=False)
     assert imported("t.csv", "names.csv").taxonomy.types == ("power", "tip")
 
 
-def test_an_empty_key_is_not_the_trial_0(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_empty_key_is_not_the_trial_0() -> None:
     frame = pd.DataFrame({"label": ["tip", "cup"] * 12, "trial": np.arange(24), "flex": np.arange(24) / 8})
     frame.astype({"trial": str}).replace({"trial": {"7": "00", "0": ""}}).to_csv("t.csv", index=False)
     pd.DataFrame({"trial": np.arange(24), "object": ["ball", "pen"] * 12}).to_csv("facts.csv", index=False)
-    assert "facts.csv has no rows of the trial with row 2\n" in refused(capsys, "t.csv", "facts.csv", "--yes")
+    assert "facts.csv has no rows of the trial with row 2\n" in refused("t.csv", "facts.csv", "--yes")
 
 
 def recordings() -> dict[str, pd.DataFrame]:
@@ -204,10 +203,10 @@ def test_bags_follow_a_table_of_segments(capsys: pytest.CaptureFixture[str]) -> 
     assert "segments.csv: segments, in seconds from its first row" in capsys.readouterr().out
     assert np.array_equal(found.is_none, np.tile([*[True] * 10, *[False] * 20, *[True] * 10], 9))
     assert found.grasps[~found.is_none].tolist() == np.repeat([*POSES] * 3, 20).tolist()
-    assert "bags is a folder: name the pattern of its tables" in refused(capsys, "bags", "segments.csv", "--yes")
+    assert "bags is a folder: name the pattern of its tables" in refused("bags", "segments.csv", "--yes")
     # A bag alone is a table, and a file next to bags is none of them, nor is a folder with other metadata.
     Path("bags/metadata.yaml").write_text("authors: us\n")
-    assert "no column looks like the grasp type" in refused(capsys, "bags/trial_01", "--yes")
+    assert "no column looks like the grasp type" in refused("bags/trial_01", "--yes")
     Path("segments.csv").rename("bags/segments.csv")
     assert imported("bags/trial_{trial}", "bags/segments.csv").fingerprint() == found.fingerprint()
 
@@ -225,13 +224,13 @@ def test_bags_follow_a_table_of_segments(capsys: pytest.CaptureFixture[str]) -> 
         ),
     ],
 )
-def test_broken_segments_are_told_in_a_sentence(rows: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_broken_segments_are_told_in_a_sentence(rows: str, said: str) -> None:
     recordings()["anna"].to_csv("anna.csv", index=False)
     Path("segments.csv").write_text(f"start,end,label\n{rows}\n")
-    assert said in refused(capsys, "anna.csv", "segments.csv", "--yes")
+    assert said in refused("anna.csv", "segments.csv", "--yes")
 
 
-def test_tables_that_do_not_belong_together_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_tables_that_do_not_belong_together_are_told() -> None:
     anna, ben = recordings().values()
     names = {"f1": "g1", "f2": "g2"}
     other = anna.rename(columns=names)
@@ -250,4 +249,4 @@ def test_tables_that_do_not_belong_together_are_told(capsys: pytest.CaptureFixtu
         ("twice", "other", "time starts again within a trial: name trials in both"),
         ("anna", "no", "no.csv: 'time' is no time in row 2, by which tables are joined"),
     ):
-        assert said in refused(capsys, f"{first}.csv", f"{second}.csv", "--yes")
+        assert said in refused(f"{first}.csv", f"{second}.csv", "--yes")

@@ -12,7 +12,7 @@ from thenar.cli import run
 from thenar.compiler import ColumnRoles, GraspSet, from_dataframe
 from thenar.compiler.recordings.columns import JointColumns
 
-from .conftest import thenar
+from .conftest import refusal, works
 
 Cells = Mapping[str, "list[str] | NDArray[np.generic]"]
 # Returns the set that a table becomes, and what was printed to stdout and stderr.
@@ -182,8 +182,7 @@ def test_true_trials_of_one_row_in_blocks_are_imported_with_a_warning(import_cel
     assert "warning: the rows look like frames of fewer trials: within a subject, grasp type" in warnings
     assert "they count as trials, because column trial numbers them" in warnings
     quick = ("--tables", "compositions", "--repeats", 1, "--rounds", 2, "--jobs", 1)
-    evaluated = thenar("evaluate", tmp_path / "set.grasps", *quick)
-    assert evaluated.returncode == 0, evaluated.stderr
+    evaluated = works("evaluate", tmp_path / "set.grasps", *quick)
     assert "each row counts as a trial" in " ".join(evaluated.stderr.split())
     cells["sample_no"] = cells.pop("trial")
     pd.DataFrame(cells).to_csv(tmp_path / "frames.csv", index=False)
@@ -191,9 +190,9 @@ def test_true_trials_of_one_row_in_blocks_are_imported_with_a_warning(import_cel
         'label = "grasp"\ntrial = "sample_no"\n[[joints]]\ncolumns = ["f*"]\nunit = "counts"\n'
     )
     columns = ("--columns", tmp_path / "columns.toml")
-    refused = thenar("import", tmp_path / "frames.csv", "-o", tmp_path / "f.grasps", *columns)
-    assert refused.returncode == 2
-    assert "the rows look like frames of fewer trials" in refused.stderr
+    assert "the rows look like frames of fewer trials" in refusal(
+        "import", tmp_path / "frames.csv", "-o", tmp_path / "f.grasps", *columns
+    )
 
 
 def test_pieces_of_trials_are_no_trials(
@@ -209,12 +208,12 @@ def test_pieces_of_trials_are_no_trials(
     assert "independent" not in said
 
 
-def test_what_a_trial_is_is_said_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_a_trial_is_is_said_once(tmp_path: Path) -> None:
     pd.DataFrame(hand()).to_csv(tmp_path / "table.csv", index=False)
     (tmp_path / "c.toml").write_text('label = "grasp"\ntrial = "trial"\nframes = "independent"\n')
     table, columns, output = (str(tmp_path / name) for name in ("table.csv", "c.toml", "set.grasps"))
-    assert run(["import", table, "-o", output, "--columns", columns]) == 2
-    assert "`trial` and `frames` = 'independent' both say what a trial is: leave one out" in capsys.readouterr().err
+    said = refusal("import", table, "-o", output, "--columns", columns)
+    assert "`trial` and `frames` = 'independent' both say what a trial is: leave one out" in said
 
 
 def test_renamed_columns_of_two_exports_merge(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -224,8 +223,7 @@ def test_renamed_columns_of_two_exports_merge(tmp_path: Path, capsys: pytest.Cap
     for name in ("a", "b"):
         assert run(["import", files[f"{name}.csv"], "-o", files[f"{name}.grasps"], "--yes"]) == 0
     merge = ["merge", files["a.grasps"], files["b.grasps"], "-o", files["all.grasps"], "--each", "session"]
-    assert run(merge) == 2
-    said = capsys.readouterr().err
+    said = refusal(*merge)
     assert "lacks 1 joint that" in said
     assert "f1, and has index_mcp instead; only sets with the same columns are merged" in said
     assert "import its table again with [rename] in the columns.toml" in said
@@ -238,8 +236,7 @@ def test_renamed_columns_of_two_exports_merge(tmp_path: Path, capsys: pytest.Cap
     for old, new, said in (("indx_mcp", "f1", "has no column 'indx_mcp'"), ("index_mcp", "f0", "'f0' occurs twice")):
         Path(files["b.toml"]).write_text(f'label = "grasp"\n[rename]\n{old} = "{new}"\n')
         capsys.readouterr()
-        assert run(again) == 2
-        assert said in capsys.readouterr().err
+        assert said in refusal(*again)
 
 
 HEAD, FINGERS = ("thumb", "index", "middle", "ring", "little"), 600
@@ -286,9 +283,7 @@ def test_text_that_is_constant_within_trials_is_a_subject_or_session(import_cell
         assert words in said
 
 
-def test_every_command_counts_trials_grasps_rests_and_frames_alike(
-    tmp_path: Path, import_cells: Import, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_command_counts_trials_grasps_rests_and_frames_alike(tmp_path: Path, import_cells: Import) -> None:
     random = np.random.default_rng(5)
     trial, _ = np.indices((24, 5)).reshape(2, -1)
     kind = np.where(trial % 2, 1 + trial // 2 % 3, 0)
@@ -305,8 +300,7 @@ def test_every_command_counts_trials_grasps_rests_and_frames_alike(
         ("merge", path, "-o", f"{folder}/merged.grasps"),
         ("split", path, "--by", "subject", "-o", f"{folder}/parts"),
     ):
-        assert run([*arguments]) == 0
-        assert size in capsys.readouterr().out
+        assert size in works(*arguments).stdout
     quick = ("--folds", "2", "--repeats", "1", "--rounds", "2", "--tables", "compositions", "--baselines", "none")
-    assert run(["evaluate", path, *quick, "--jobs", "1"]) == 0
-    assert "12 trials of 60 frames, 3 grasp types; 12 rests left out;" in " ".join(capsys.readouterr().out.split())
+    done = works("evaluate", path, *quick, "--jobs", "1")
+    assert "12 trials of 60 frames, 3 grasp types; 12 rests left out;" in " ".join(done.stdout.split())

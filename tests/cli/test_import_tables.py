@@ -7,10 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thenar.cli import run
 from thenar.compiler import from_dataframe
 
-from .conftest import columns_toml, imported, refused
+from .conftest import columns_toml, imported, refusal, refused, works
 
 pytestmark = pytest.mark.usefixtures("importing")
 
@@ -67,13 +66,13 @@ def test_lines_before_the_table_are_left_out(
         assert grasp_set.joint_names == FINGERS[:4]
         said = capsys.readouterr().out
     else:
-        assert "no column tells which rows are frames of one trial" in refused(capsys, "t.txt", "--yes")
+        assert "no column tells which rows are frames of one trial" in refused("t.txt", "--yes")
     lines = PREFACES[kind].count("\n")
     assert (f"skip = {lines}\n" in columns_toml().read_text()) is bool(lines)
     assert ("rows left out at the top" in said) is bool(lines and header)
 
 
-def test_a_spreadsheet_has_lines_before_its_table_too(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_spreadsheet_has_lines_before_its_table_too() -> None:
     frame = pd.DataFrame(rows(3), columns=["grasp", "trial", *FINGERS[:3]]).astype({"trial": int})
     frame = frame.astype(dict.fromkeys(FINGERS[:3], float))
     with pd.ExcelWriter("t.xlsx", engine="openpyxl") as writer:
@@ -83,11 +82,11 @@ def test_a_spreadsheet_has_lines_before_its_table_too(capsys: pytest.CaptureFixt
     assert grasp_set.joint_names == FINGERS[:3]
     assert "skip = 3\n" in columns_toml().read_text()
     columns_toml().write_text(columns_toml().read_text().replace("skip = 3", "skip = 99"))
-    assert run(["import", "t.xlsx", "-o", "c.grasps", "--columns", str(columns_toml())]) == 2
-    assert "t.xlsx: it holds no cells below row 99 (`skip`)" in capsys.readouterr().err
+    said = refusal("import", "t.xlsx", "-o", "c.grasps", "--columns", str(columns_toml()))
+    assert "t.xlsx: it holds no cells below row 99 (`skip`)" in said
 
 
-def test_rows_keep_their_numbers_below_a_preface(capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_keep_their_numbers_below_a_preface() -> None:
     write("t.csv", [["grasp", "trial", "a"], *rows(1)])
     text = PREFACES["sto"] + Path("t.csv").read_text()
     Path("t.csv").write_text(text)
@@ -95,11 +94,10 @@ def test_rows_keep_their_numbers_below_a_preface(capsys: pytest.CaptureFixture[s
     lines = text.splitlines()
     lines[9] = "A,1,oops"
     Path("t.csv").write_text("\n".join(lines))
-    assert run(["import", "t.csv", "-o", "c.grasps", "--columns", str(columns_toml())]) == 2
-    assert "row 10 'a' ('oops')" in capsys.readouterr().err
+    assert "row 10 'a' ('oops')" in refusal("import", "t.csv", "-o", "c.grasps", "--columns", str(columns_toml()))
 
 
-def test_runs_of_blanks_are_one_delimiter(capsys: pytest.CaptureFixture[str]) -> None:
+def test_runs_of_blanks_are_one_delimiter() -> None:
     """As MATLAB's `save -ascii` and numpy.savetxt write them, with a comment for a header."""
     body = [["0" if row[0] == "A" else "1", *row[1:]] for row in rows(3)]
     lines = ["".join(f"{float(cell):16.7e}" for cell in row) + "  " for row in body]
@@ -120,7 +118,7 @@ LISTS = {
 }
 
 
-def wide_codes(capsys: pytest.CaptureFixture[str]) -> np.ndarray:
+def wide_codes() -> np.ndarray:
     """Return the codes of a table with a column for each number of the lists."""
     wide = pd.DataFrame([[row[0], row[1], *map(float, row[2:])] for row in rows(3)])
     wide.columns = pd.Index(["grasp", "trial", "data.0", "data.1", "data.2"])
@@ -129,22 +127,22 @@ def wide_codes(capsys: pytest.CaptureFixture[str]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", LISTS)
-def test_lists_in_cells_become_columns(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lists_in_cells_become_columns(kind: str) -> None:
     table = pd.DataFrame(
         [[row[0], row[1], LISTS[kind](row[2:])] for row in rows(3)], columns=["grasp", "trial", "data"]
     )
     table.to_csv("t.csv", index=False)
     grasp_set = imported("t.csv")
     assert grasp_set.joint_names == ("data.0", "data.1", "data.2")
-    assert np.array_equal(grasp_set.codes, wide_codes(capsys))
+    assert np.array_equal(grasp_set.codes, wide_codes())
 
 
-def test_so_do_lists_of_spreadsheets_data_frames_and_parquet(capsys: pytest.CaptureFixture[str]) -> None:
+def test_so_do_lists_of_spreadsheets_data_frames_and_parquet() -> None:
     lists = pd.DataFrame(
         [[row[0], int(row[1]), [float(cell) for cell in row[2:]]] for row in rows(3)],
         columns=["grasp", "trial", "data"],
     )
-    codes = wide_codes(capsys)
+    codes = wide_codes()
     lists.astype({"data": str}).to_excel("t.xlsx", index=False)
     lists.to_parquet("t.parquet")
     for name in ("t.xlsx", "t.parquet"):
@@ -172,17 +170,16 @@ ODDITIES = {
 
 
 @pytest.mark.parametrize("text", ODDITIES, ids=range(len(ODDITIES)))
-def test_the_error_names_the_first_oddity(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_error_names_the_first_oddity(text: str) -> None:
     Path("t.csv").write_text(text)
-    assert ODDITIES[text] in refused(capsys, "t.csv", "--yes")
+    assert ODDITIES[text] in refused("t.csv", "--yes")
 
 
-def test_a_column_with_a_broken_cell_is_left_out_by_its_row(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_column_with_a_broken_cell_is_left_out_by_its_row() -> None:
     broken = "grasp,trial,a,b\nA,1,0,1.5\nB,1,x,2.5\nA,2,1,3\nB,2,1,4\n"
     Path("t.csv").write_text(broken)
-    assert run(["import", "t.csv", "-o", "t.grasps", "--yes"]) == 0
-    told = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    told = " ".join(works("import", "t.csv", "-o", "t.grasps", "--yes").stdout.replace("│", " ").split())
     assert "a left out row 3 has 'x' in column 'a', which holds numbers elsewhere: correct the cell" in told
     Path("t.csv").write_text(broken.replace("grasp", "kind"))
-    assert run(["import", "t.csv", "-o", "t.grasps", "--yes", "--overwrite"]) == 0
-    assert "kind label" in " ".join(capsys.readouterr().out.replace("│", " ").split())
+    done = works("import", "t.csv", "-o", "t.grasps", "--yes", "--overwrite")
+    assert "kind label" in " ".join(done.stdout.replace("│", " ").split())

@@ -8,10 +8,11 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet
 
+from .conftest import works
 
-def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["info", str(grasps)]) == 0
-    said = capsys.readouterr().out
+
+def test_a_set_is_described_for_people(grasps: Path) -> None:
+    said = works("info", grasps).stdout
     for words in (
         "4 trials of 4 frames, 2 grasp types (own); subjects 2, objects 2, switches 2, joints 1",
         "50.0%",
@@ -22,21 +23,19 @@ def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixtu
         assert words in said
 
 
-def test_rows_in_which_nothing_is_held_are_shown_last(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_in_which_nothing_is_held_are_shown_last(grasps: Path) -> None:
     found = GraspSet.load(grasps)
     replace(found, grasps=np.array(["mug", "ball", "none", "none"]), times_us=np.array([0, 0, 10_000, 20_000])).save(
         grasps
     )
-    assert run(["info", str(grasps)]) == 0
-    said = capsys.readouterr().out
+    said = works("info", grasps).stdout
     assert "4 trials (2 grasps, 2 rests) of 4 frames, 2 grasp types (own); subjects 2" in said
     assert "movements 4, 0.0 s" in said
     assert [line.split()[1] for line in said.splitlines() if line.endswith("% │")] == ["mug", "ball", "none"]
 
 
-def test_a_set_is_described_for_machines(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["info", str(grasps), "--json"]) == 0
-    summary = json.loads(capsys.readouterr().out)
+def test_a_set_is_described_for_machines(grasps: Path) -> None:
+    summary = json.loads(works("info", grasps, "--json").stdout)
     assert summary["fingerprint"] == GraspSet.load(grasps).fingerprint()
     assert summary["grasps"] == {"mug": 2, "ball": 2}
 

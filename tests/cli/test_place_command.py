@@ -9,20 +9,18 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet, grow_id3
 
+from .conftest import refusal, works
 
-def test_the_placement_is_printed_for_people(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["place", str(set_file), "--method", "id3"]) == 0
-    said = capsys.readouterr().out
+
+def test_the_placement_is_printed_for_people(set_file: Path) -> None:
+    said = works("place", set_file, "--method", "id3").stdout
     for words in ("cumulative share", "s4", "0.6008", "37.9%", "of 6 switches", "of 1.585 bits"):
         assert words in said
 
 
-def test_the_placement_is_printed_for_machines_and_stored(
-    set_file: Path, small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_placement_is_printed_for_machines_and_stored(set_file: Path, small_set: GraspSet, tmp_path: Path) -> None:
     stored = tmp_path / "placement.json"
-    assert run(["place", str(set_file), "--prune", "5", "--json", "-o", str(stored)]) == 0
-    placement = json.loads(capsys.readouterr().out)
+    placement = json.loads(works("place", set_file, "--prune", "5", "--json", "-o", stored).stdout)
     assert json.loads(stored.read_text()) == placement
     tree = grow_id3(small_set.switches, small_set.grasps, min_samples=5)
     assert [chosen["number"] for chosen in placement["switches"]] == list(tree.inputs)
@@ -42,11 +40,8 @@ def test_the_placement_is_printed_for_machines_and_stored(
         (["--prune", "-1"], "-1 is not in the range x>=0"),
     ],
 )
-def test_a_mistake_is_one_sentence_and_code_two(
-    set_file: Path, options: list[str], reason: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["place", str(set_file), *options]) == 2
-    assert reason in capsys.readouterr().err
+def test_a_mistake_is_one_sentence_and_code_two(set_file: Path, options: list[str], reason: str) -> None:
+    assert reason in refusal("place", set_file, *options)
 
 
 @pytest.mark.parametrize(
@@ -60,15 +55,13 @@ def test_a_mistake_is_one_sentence_and_code_two(
 def test_a_placement_of_no_switch_says_why(
     small_set: GraspSet,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
     grasps: list[str],
     options: list[str],
     remark: str,
 ) -> None:
     two = replace(small_set.rows([0, 0]), grasps=np.array(grasps))
     two.save(tmp_path / "two.grasps")
-    assert run(["place", str(tmp_path / "two.grasps"), *options]) == 0
-    said = capsys.readouterr().out
+    said = works("place", tmp_path / "two.grasps", *options).stdout
     assert "0 of 6 switches" in said
     assert remark in said
     assert sum(words in said for words in ("one grasp type:", "no decision was made", "agree in every switch")) == 1
@@ -87,10 +80,9 @@ sensors = ["*"]
 """
 
 
-def sensors(capsys: pytest.CaptureFixture[str], *asked: object) -> dict[str, Any]:
+def sensors(*asked: object) -> dict[str, Any]:
     """Return the JSON document of `thenar place` of sensors."""
-    assert run(["place", *map(str, asked), "--json", "--jobs", "1"]) == 0
-    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    found: dict[str, Any] = json.loads(works("place", *asked, "--json", "--jobs", "1").stdout)
     return found
 
 
@@ -103,33 +95,28 @@ def test_the_curve_is_printed_and_drawn(set_file: Path, tmp_path: Path, capsys: 
     assert (tmp_path / "curve.svg").read_text().startswith("<?xml")
 
 
-def test_what_is_there_what_is_missed_least_and_what_replaces(
-    set_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    best = [row["name"] for row in sensors(capsys, set_file, "--sensors", 3)["chosen"]]
-    kept = sensors(capsys, set_file, "--sensors", 3, "--have", "s2")
+def test_what_is_there_what_is_missed_least_and_what_replaces(set_file: Path) -> None:
+    best = [row["name"] for row in sensors(set_file, "--sensors", 3)["chosen"]]
+    kept = sensors(set_file, "--sensors", 3, "--have", "s2")
     assert kept["chosen"][0]["name"] == "s2"
-    dropped = sensors(capsys, set_file, "--drop", 2)
+    dropped = sensors(set_file, "--drop", 2)
     assert len(dropped["chosen"]) == 6
     assert len(dropped["left_out"]) == 2
-    other = sensors(capsys, set_file, "--sensors", 3, "--instead-of", best[0])
+    other = sensors(set_file, "--sensors", 3, "--instead-of", best[0])
     names = [row["name"] for row in other["chosen"]]
     assert {*best[1:]} < {*names}
     assert names[-1] not in best
-    alone = sensors(capsys, set_file, "--have", ",".join(best), "--instead-of", best[0])
+    alone = sensors(set_file, "--have", ",".join(best), "--instead-of", best[0])
     assert alone["chosen"] == other["chosen"]
 
 
 @pytest.mark.slow
-def test_a_price_is_kept_to_and_parts_are_named(
-    set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_price_is_kept_to_and_parts_are_named(set_file: Path, tmp_path: Path) -> None:
     prices = tmp_path / "prices.toml"
     prices.write_text(PRICES)
-    found = sensors(capsys, set_file, "--price", 14, "--prices", prices)
+    found = sensors(set_file, "--price", 14, "--prices", prices)
     assert sum(row["price"] for row in found["chosen"]) <= 14
-    assert run(["place", str(set_file), "--sensors", "2", "--prices", str(prices), "--jobs", "1"]) == 0
-    said = capsys.readouterr().out
+    said = works("place", set_file, "--sensors", "2", "--prices", prices, "--jobs", "1").stdout
     assert "snap-action switch" in said or "flex sensor" in said
     assert "2 of 8 sensors, price" in said
 

@@ -16,6 +16,7 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.trainers.base import Trainer
 
 from ..sets import grasp_set_of
+from .conftest import refusal, works
 
 TYPES = ("hook", "pinch")
 PARTS = (12, 30, 8)
@@ -57,8 +58,7 @@ def test_segments_are_those_that_were_recorded(
         assert run(["segment", str(movements), "-b", str(build), option, str(name), *lag]) == 0
     assert "18 segments in 9.0 s of 3 streams" in capsys.readouterr().out
     assert len(names[0].read_text().splitlines()) == 19
-    assert run(["segment", str(movements), "-b", str(build), "--json", *lag]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(works("segment", movements, "-b", build, "--json", *lag).stdout)
     assert found["f1"] == [1, 1, 1]
     grasp_set = GraspSet.load(movements)
     for number, one in enumerate(found["segments"]):
@@ -88,28 +88,23 @@ def test_a_real_clock_changes_no_segment(
     build: Path,
     damage: Callable[[np.ndarray, np.random.Generator], np.ndarray],
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     clean, random = GraspSet.load(movements), np.random.default_rng(5)
     times = np.concatenate([damage(10_000 * np.arange(300), random) for _ in "ABC"])
     # Single frames that could not be read are rows that are not there.
     read = random.random(len(clean)) > 0.03
     replace(clean, times_us=times).rows(np.flatnonzero(read)).save(tmp_path / "damaged.grasps")
-    assert run(["segment", str(tmp_path / "damaged.grasps"), "-b", str(build), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(works("segment", tmp_path / "damaged.grasps", "-b", build, "--json").stdout)
     assert (found["streams"], len(found["segments"])) == (3, 18)
     assert min(found["f1"]) > 0.99
 
 
-def test_a_pause_ends_a_stream_but_divides_no_true_grasp(
-    movements: Path, build: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pause_ends_a_stream_but_divides_no_true_grasp(movements: Path, build: Path, tmp_path: Path) -> None:
     clean, paused = GraspSet.load(movements), tmp_path / "paused.grasps"
     times = np.tile(10_000 * np.arange(300), 3)
     times[127:300] += 1_100_000  # in the middle of A's third grasp
     replace(clean, times_us=times).save(paused)
-    assert run(["segment", str(paused), "-b", str(build), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(works("segment", paused, "-b", build, "--json").stdout)
     assert (found["streams"], len(found["segments"])) == (4, 19)
     assert found["f1"][0] == pytest.approx(2 * 18 / (18 + 19))
 
@@ -124,17 +119,13 @@ def test_refusals_say_what_to_do(
 ) -> None:
     grasp_set = GraspSet.load(movements)
     replace(grasp_set.without_none(), independent=True).save(tmp_path / "rows.grasps")
-    assert run(["segment", str(tmp_path / "rows.grasps"), "-b", str(build)]) == 2
-    assert "whole movements" in capsys.readouterr().err
+    assert "whole movements" in refusal("segment", tmp_path / "rows.grasps", "-b", build)
     assert run(["segment", str(movements), "-b", str(build), "-o", str(movements)]) == 2
     capsys.readouterr()
-    assert run(["evaluate", str(tmp_path / "rows.grasps"), "--streams"]) == 2
-    assert "whole movements" in capsys.readouterr().err
+    assert "whole movements" in refusal("evaluate", tmp_path / "rows.grasps", "--streams")
     grasp_set.without_none().save(tmp_path / "held.grasps")
-    assert run(["evaluate", str(tmp_path / "held.grasps"), "--streams"]) == 2
-    assert "nothing is held" in capsys.readouterr().err
-    assert run(["evaluate", str(movements), "--streams", "--subject", "A"]) == 2
-    assert "a subject out takes two" in capsys.readouterr().err
+    assert "nothing is held" in refusal("evaluate", tmp_path / "held.grasps", "--streams")
+    assert "a subject out takes two" in refusal("evaluate", movements, "--streams", "--subject", "A")
 
 
 def test_streams_are_evaluated_without_the_subject(
@@ -162,7 +153,7 @@ def test_streams_are_evaluated_without_the_subject(
 @pytest.mark.slow
 @pytest.mark.parametrize("most", [5500, 200])  # more, and fewer, than two rows of each movement
 def test_of_many_movements_few_frames_are_learnt_from(
-    most: int, movements: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    most: int, movements: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     once, boosted, learnt = GraspSet.load(movements), type(TRAINERS["logitboost"]), []
     rows = np.flatnonzero(once.subjects != "C")
@@ -180,18 +171,14 @@ def test_of_many_movements_few_frames_are_learnt_from(
     monkeypatch.setattr(boosted, "train", counted)
     monkeypatch.setattr(stream_study, "_LEARNT", most)
     line = ["evaluate", str(tmp_path / "many.grasps"), "--streams", "--rounds", "1", "--jobs", "1", "--json"]
-    assert run(line) == 0
-    study = json.loads(capsys.readouterr().out)
+    study = json.loads(works(*line).stdout)
     assert study["movements"] == 360
     assert most / 5 < max(learnt) <= most
     assert study["rows"][0]["values"]["F1@50"]["mean"] > 0.95
 
 
-def test_a_build_of_grasps_alone_finds_segments_by_what_it_refuses(
-    movements: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_build_of_grasps_alone_finds_segments_by_what_it_refuses(movements: Path, tmp_path: Path) -> None:
     held = GraspSet.load(movements).without_none()
     folder = compile_build(held, tmp_path / "build", rounds=5, folds=0).folder
     assert "segments" not in json.loads((folder / "build.json").read_text())
-    assert run(["segment", str(movements), "-b", str(folder), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["f1"][2] > 0.9
+    assert json.loads(works("segment", movements, "-b", folder, "--json").stdout)["f1"][2] > 0.9

@@ -17,6 +17,7 @@ from thenar.cli import notify, run
 from thenar.runtime import Build
 
 from ..conftest import tool
+from ..sending import free_port
 
 Captured = pytest.CaptureFixture[str]
 UNIT = "etc/systemd/system/thenar.service"
@@ -144,14 +145,12 @@ def test_a_state_reaches_an_abstract_socket_or_nobody(tmp_path: Path, monkeypatc
 
 
 def test_a_live_run_reports_to_systemd_while_frames_come_and_no_longer(build_folder: Path, tmp_path: Path) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        address = free.getsockname()
+    port = free_port()
     manifest = Build.load(build_folder).manifest
     switches = [switch.name for switch in manifest.switches]
     joints = ", ".join(f"{joint.name} = [0, 255]" for joint in manifest.joints)
     harness, place = tmp_path / "glove.toml", str(tmp_path / "notify")
-    stream = f'port = "udp://127.0.0.1:{address[1]}"\nswitches = {json.dumps(switches)}\njoints = {{ {joints} }}\n'
+    stream = f'port = "udp://127.0.0.1:{port}"\nswitches = {json.dumps(switches)}\njoints = {{ {joints} }}\n'
     harness.write_text(f"[[stream]]\n{stream}")
     row = json.dumps(dict.fromkeys(switches, 0) | {joint.name: 100 for joint in manifest.joints}).encode()
     command = [sys.executable, "-m", "thenar.cli", "run", str(build_folder), "--glove", str(harness)]
@@ -169,7 +168,7 @@ def test_a_live_run_reports_to_systemd_while_frames_come_and_no_longer(build_fol
                 reports = list[bytes]()
                 with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as glove:
                     for _ in range(3000):
-                        glove.sendto(row, address)
+                        glove.sendto(row, ("127.0.0.1", port))
                         with suppress(TimeoutError):
                             reports.append(systemd.recv(100))
                         if len(reports) == 2:

@@ -9,6 +9,8 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.scenes import shipped
 
+from .conftest import works
+
 SMALL = ("--jobs", "1", "--repetitions", "1")
 Captured = pytest.CaptureFixture[str]
 
@@ -31,9 +33,9 @@ def test_a_shipped_scene_becomes_a_set_and_says_that_it_is_simulated(tmp_path: P
     assert "Grasps, simulated" in printed
 
 
-def test_the_summary_has_a_row_for_every_grasp_type(tmp_path: Path, capsys: Captured) -> None:
-    assert run(["simulate", "quick", *SMALL, "-o", str(tmp_path / "set.grasps")]) == 0
-    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in capsys.readouterr().out.splitlines()]
+def test_the_summary_has_a_row_for_every_grasp_type(tmp_path: Path) -> None:
+    done = works("simulate", "quick", *SMALL, "-o", tmp_path / "set.grasps")
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in done.stdout.splitlines()]
     assert [row[:2] for row in rows if len(row) == 11] == [[name, "2"] for name in load_types()]
 
 
@@ -41,10 +43,9 @@ def load_types() -> tuple[str, ...]:
     return tuple(dict.fromkeys(item.grasp for item in load_scene("quick").objects))
 
 
-def test_json_holds_the_whole_report(tmp_path: Path, capsys: Captured) -> None:
+def test_json_holds_the_whole_report(tmp_path: Path) -> None:
     path = tmp_path / "set.grasps"
-    assert run(["simulate", "quick", *SMALL, "-o", str(path), "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    report = json.loads(works("simulate", "quick", *SMALL, "-o", path, "--json").stdout)
     assert report["simulated"] is True
     assert (report["scene"], report["repetitions"], report["rows"]) == ("quick", 28, len(GraspSet.load(path)))
     assert len(report["grasps"]) == 14
@@ -61,11 +62,11 @@ def test_a_scene_can_be_changed_on_the_way(tmp_path: Path, capsys: Captured) -> 
     assert json.loads(capsys.readouterr().out)["subjects"] == ["C"]
 
 
-def test_the_first_subjects_of_a_scene_are_those_that_their_names_give(tmp_path: Path, capsys: Captured) -> None:
+def test_the_first_subjects_of_a_scene_are_those_that_their_names_give(tmp_path: Path) -> None:
     first, named = tmp_path / "first.grasps", tmp_path / "named.grasps"
     assert run(["simulate", "crowd", *SMALL, "--subjects", "2", "-o", str(first)]) == 0
-    assert run(["simulate", "crowd", *SMALL, "--subject", "P002", "--subject", "P001", "-o", str(named)]) == 0
-    assert "2 subjects, 28 grasps" in capsys.readouterr().out
+    done = works("simulate", "crowd", *SMALL, "--subject", "P002", "--subject", "P001", "-o", named)
+    assert "2 subjects, 28 grasps" in done.stdout
     assert first.read_bytes() == named.read_bytes()
 
 
@@ -79,15 +80,14 @@ def test_rests_between_movements_are_simulated_and_counted_as_none(tmp_path: Pat
     assert f"{path}: {made.size}, simulated" in capsys.readouterr().out
 
 
-def test_more_draws_fresh_grasps_and_help_explains_the_seed(tmp_path: Path, capsys: Captured) -> None:
+def test_more_draws_fresh_grasps_and_help_explains_the_seed(tmp_path: Path) -> None:
     path = tmp_path / "fresh.grasps"
-    assert run(["simulate", "quick", *SMALL, "--more", "3", "-o", str(path)]) == 0
-    assert "scene quick, seed 1, after repetition 1, 2 subjects, 84 grasps" in capsys.readouterr().out
+    done = works("simulate", "quick", *SMALL, "--more", "3", "-o", path)
+    assert "scene quick, seed 1, after repetition 1, 2 subjects, 84 grasps" in done.stdout
     made = GraspSet.load(path)
     assert made.simulated == "scene quick, seed 1, 3 more after 1 repetitions"
     assert made.trials.min() >= 14
-    assert run(["simulate", "--help"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
+    said = " ".join(works("simulate", "--help").stdout.split())
     assert "habits, calibrations, the glove's parts, all grasps. Hand sizes stay." in said
 
 
@@ -102,12 +102,10 @@ def hasty(tmp_path: Path) -> Path:
     return path
 
 
-def test_what_did_not_settle_is_warned_of_by_name(hasty: Path, tmp_path: Path, capsys: Captured) -> None:
+def test_what_did_not_settle_is_warned_of_by_name(hasty: Path, tmp_path: Path) -> None:
     path = tmp_path / "set.grasps"
-    assert run(["simulate", str(hasty), *SMALL, "-o", str(path), "--json"]) == 0
-    unsettled = json.loads(capsys.readouterr().out)["unsettled"]
-    assert run(["simulate", str(hasty), *SMALL, "-o", str(path), "--overwrite"]) == 0
-    warning = capsys.readouterr().err
+    unsettled = json.loads(works("simulate", hasty, *SMALL, "-o", path, "--json").stdout)["unsettled"]
+    warning = works("simulate", hasty, *SMALL, "-o", path, "--overwrite").stderr
     assert warning.startswith(f"warning: {len(unsettled)} of 28 grasps did not settle, and are left out of the set")
     for one in unsettled[:10]:
         place = f"subject {one['subject']}, {one['grasp']} with {one['object']}, repetition {one['repetition']}"
@@ -116,20 +114,18 @@ def test_what_did_not_settle_is_warned_of_by_name(hasty: Path, tmp_path: Path, c
     assert len(GraspSet.load(path)) == 28 - len(unsettled)
 
 
-def test_what_did_not_settle_is_kept_when_asked(hasty: Path, tmp_path: Path, capsys: Captured) -> None:
+def test_what_did_not_settle_is_kept_when_asked(hasty: Path, tmp_path: Path) -> None:
     path = tmp_path / "set.grasps"
-    assert run(["simulate", str(hasty), *SMALL, "-o", str(path), "--keep-unsettled"]) == 0
-    assert "did not settle, and are kept as requested" in capsys.readouterr().err
+    done = works("simulate", hasty, *SMALL, "-o", path, "--keep-unsettled")
+    assert "did not settle, and are kept as requested" in done.stderr
     assert len(GraspSet.load(path)) == 28
 
 
-def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
-    assert run(["simulate", "--list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_shipped_scenes_are_listed_with_what_they_are() -> None:
+    lines = works("simulate", "--list").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(shipped())
     assert all("Simulated." in line for line in lines)
-    assert run(["simulate", "--list", "--json"]) == 0
-    assert [scene["name"] for scene in json.loads(capsys.readouterr().out)] == list(shipped())
+    assert [scene["name"] for scene in json.loads(works("simulate", "--list", "--json").stdout)] == list(shipped())
 
 
 @pytest.mark.parametrize(

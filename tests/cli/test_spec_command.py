@@ -18,7 +18,7 @@ from thenar.runtime.harness.writing import harness_to_toml
 from thenar.simulator.handmaps.handmap import hand_map
 
 from ..sets import grasp_set_of
-from .conftest import thenar
+from .conftest import thenar, works
 
 NAMES = ("thumb_distal_5", "palm_heel_6", "index_distal_3", "little_distal_8")
 
@@ -79,8 +79,7 @@ def test_without_a_folder_nothing_is_written(hand_build: Path) -> None:
 
 
 def test_machines_get_the_same_as_spec_json(hand_build: Path, tmp_path: Path) -> None:
-    done = thenar("spec", hand_build, "--json", "--hand-length", 171, "-o", tmp_path / "spec")
-    assert done.returncode == 0, done.stderr
+    done = works("spec", hand_build, "--json", "--hand-length", 171, "-o", tmp_path / "spec")
     assert json.loads(done.stdout) == json.loads((tmp_path / "spec" / "spec.json").read_bytes())
     assert json.loads(done.stdout)["hand_length_mm"] == 171
 

@@ -12,7 +12,7 @@ from thenar.stability import cases
 from thenar.stability import report as catalogue
 from thenar.stability.finding import Case
 
-from .conftest import thenar
+from .conftest import refusal
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -53,9 +53,7 @@ def here(folder: Path, capsys: pytest.CaptureFixture[str]) -> Thenar:
 
 
 def test_a_case_of_another_name_is_refused_with_the_nearest() -> None:
-    done = thenar("stability", "seperable")
-    assert done.returncode == 2
-    assert "there is no case 'seperable' (did you mean 'separable'" in done.stderr
+    assert "there is no case 'seperable' (did you mean 'separable'" in refusal("stability", "seperable")
 
 
 def test_cases_that_hold_exit_with_0_and_print_error_bound_and_verdict(here: Thenar) -> None:

@@ -1,8 +1,6 @@
 """Pads with levels from a set to recognition: compiled for a board, emulated, recognised, recorded, imported."""
 
 import json
-import os
-import shutil
 import sys
 from bisect import bisect
 from pathlib import Path
@@ -15,8 +13,9 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.reader import Reader
 
+from ..conftest import tool
 from ..sets import grasp_set_of
-from .conftest import thenar
+from .conftest import thenar, works
 
 # In real time, over a pty.
 pytestmark = pytest.mark.slow
@@ -82,18 +81,15 @@ def pads(folder: Path) -> Path:
 
 @pytest.mark.parametrize("wiring", GLOVES)
 def test_a_glove_of_pads_recognises_by_their_levels(tmp_path: Path, wiring: str) -> None:
-    if wiring != "board" and shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    if wiring != "board":
+        tool("umockdev-wrapper")
     grasps, glove, build = pads(tmp_path), tmp_path / "glove.toml", tmp_path / "build"
     glove.write_text(GLOVES[wiring])
-    done = thenar("compile", grasps, "-o", build, "--rounds", "10", "--folds", "0", "--glove", glove, "--no-report")
-    assert done.returncode == 0, done.stderr
+    works("compile", grasps, "-o", build, "--rounds", "10", "--folds", "0", "--glove", glove, "--no-report")
     record, log = tmp_path / "run.mcap", tmp_path / "log.jsonl"
     run = ("run", build, "--glove", "{glove}", "--frames", "800", "--record", record)
     emulate = ("emulate", grasps, "--glove", glove, "--dir", tmp_path / "emulated", "--period-ms", "100", "--log", log)
-    done = thenar(*emulate, "--", sys.executable, "-m", "thenar.cli", *run)
-    assert done.returncode == 0, done.stderr
+    done = works(*emulate, "--", sys.executable, "-m", "thenar.cli", *run)
     shown = [json.loads(line) for line in log.read_text().splitlines()]
     starts = [frame["time_us"] for frame in shown]
     judged = 0
@@ -105,14 +101,11 @@ def test_a_glove_of_pads_recognises_by_their_levels(tmp_path: Path, wiring: str)
     assert judged > 50
     coded = [entry.taxels for entry in Reader(record) if isinstance(entry, SwitchFrame) and entry.taxels is not None]
     assert len(coded) > 100
-    done = thenar("run", build, "--replay", record)
-    assert done.returncode == 0, done.stderr
+    works("run", build, "--replay", record)
 
 
 def test_doctor_finds_converters_and_what_is_wrong_with_them(tmp_path: Path) -> None:
-    if shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    tool("umockdev-wrapper")
     grasps, glove, own = pads(tmp_path), tmp_path / "glove.toml", tmp_path / "own.toml"
     glove.write_text(GLOVES["spi and i2c"])
     # A converter more than there is: its address acknowledges nothing.

@@ -12,7 +12,7 @@ from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import tables_from_bytes, tables_to_bytes
 
 from ..conftest import tool
-from .conftest import thenar
+from .conftest import refusal, thenar, works
 
 
 def _silence_joints(folder: Path) -> None:
@@ -28,8 +28,7 @@ def _silence_joints(folder: Path) -> None:
 
 
 def test_a_sound_build_holds(set_file: Path, build_folder: Path) -> None:
-    done = thenar("verify", build_folder, set_file)
-    assert done.returncode == 0, done.stderr
+    done = works("verify", build_folder, set_file)
     assert "60 rows of 60 trials; the build was trained on 60 of these trials" in done.stdout
     assert done.stdout.endswith("holds\n")
 
@@ -60,8 +59,7 @@ def test_a_broken_bound_exits_with_1_and_lists_rows(set_file: Path, build_folder
 @pytest.mark.slow
 def test_firmware_is_compiled_and_held_against_python(set_file: Path, build_folder: Path) -> None:
     tool("gcc")
-    done = thenar("verify", build_folder, set_file, "--firmware", "host")
-    assert done.returncode == 0, done.stderr
+    done = works("verify", build_folder, set_file, "--firmware", "host")
     assert "host: every score, grasp type, margin and probability of " in done.stdout
     assert "the build carries the firmware that thenar makes of it now" in done.stdout
     found = json.loads(thenar("verify", build_folder, set_file, "--firmware", "host", "--json").stdout)
@@ -80,9 +78,9 @@ def test_firmware_that_is_not_the_builds_is_exit_code_1(set_file: Path, build_fo
 
 
 def test_firmware_for_what_there_is_not_is_refused_with_what_there_is(set_file: Path, build_folder: Path) -> None:
-    done = thenar("verify", build_folder, set_file, "--firmware", "host,pdp11")
-    assert done.returncode == 2
-    assert "there is no target 'pdp11': choose one of host, avr, micropython" in done.stderr
+    assert "there is no target 'pdp11': choose one of host, avr, micropython" in refusal(
+        "verify", build_folder, set_file, "--firmware", "host,pdp11"
+    )
 
 
 def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[str]) -> None:
@@ -114,8 +112,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
 
 def test_the_worst_faults_are_in_build_json_report_and_spec(set_file: Path, tmp_path: Path) -> None:
     folder = tmp_path / "build"
-    done = thenar("compile", set_file, "-o", folder, "--rounds", "5", "--folds", "0")
-    assert done.returncode == 0, done.stderr
+    done = works("compile", set_file, "-o", folder, "--rounds", "5", "--folds", "0")
     printed = thenar("verify", folder, set_file, "--faults").stdout.splitlines()
     found = json.loads(thenar("verify", folder, set_file, "--faults", "--json").stdout)
     manifest = manifest_from_bytes((folder / "build.json").read_bytes())
@@ -133,6 +130,4 @@ def test_the_worst_faults_are_in_build_json_report_and_spec(set_file: Path, tmp_
         assert f"  {sentence}" in printed
         assert f"<dd>{sentence.replace(chr(39), '&#39;')}</dd>" in page
         assert f"at worst, on training rows: {sentence}" in done.stdout
-    refused = thenar("verify", folder, set_file, "--faults", "--firmware", "host")
-    assert refused.returncode == 2
-    assert "give one of them" in refused.stderr
+    assert "give one of them" in refusal("verify", folder, set_file, "--faults", "--firmware", "host")

@@ -24,7 +24,7 @@ from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
 
 from ..sets import grasp_set_of
-from .conftest import thenar
+from .conftest import refusal, thenar
 from .test_adapt_command import BARE
 from .test_record_command import GLOVE
 
@@ -162,7 +162,7 @@ def test_a_glove_that_does_not_fit_is_refused_before_any_trial(
 
 
 def test_a_folder_of_other_files_is_refused_before_any_trial(folder: Path) -> None:
-    done = thenar("wear", folder / "build", "--glove", folder / "glove.toml", "-o", folder)
-    assert done.returncode == 2
-    assert "is not empty and not a build" in done.stderr
+    assert "is not empty and not a build" in refusal(
+        "wear", folder / "build", "--glove", folder / "glove.toml", "-o", folder
+    )
     assert not Path(f"{folder}.mcap").exists()

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from thenar.compiler.hand import HandShape
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.simulator.handmaps.handmap import hand_map
 
 from ..sets import grasp_set_of
 
@@ -34,6 +36,13 @@ def make_set(
         subjects=np.array([f"S{row // types % subjects}" for row in range(rows)]),
     )
     return grasp_set if frames == 1 else grasp_set.rows(np.repeat(np.arange(rows), frames))
+
+
+@pytest.fixture(scope="session")
+def hand() -> HandShape:
+    shape = hand_map().fitted(hand_map().names)
+    assert shape is not None
+    return shape
 
 
 @pytest.fixture(scope="session")

@@ -43,6 +43,8 @@ PORT = {"bus": 0, "chip": 1, "reading": "AB", "switches": [[0, 2]], "closed_high
         (changed(schema=0), "has schema 0, this thenar reads 1"),
         (changed(more=1), "unknown field `more`"),
         (changed(ports=[PORT | {"bus": -1}]), "is not a build's: .*bus"),
+        (changed(ports=[PORT | {"reading": "a\0b"}]), "holds a control character"),
+        (changed(ports=[PORT | {"reading": "9" * 5000}]), "has 5000 characters: at most 200"),
         (changed(ports=[PORT | {"switches": []}]), "has a port without switches, or with levels too"),
         (changed(ports=[PORT | {"levels": [[7, 3]]}]), "has a port without switches, or with levels too"),
         (changed(streams=[{"switches": [], "levels": [[0, 8, 5], [0, 7, 6]]}]), "has levels out of order"),
@@ -54,7 +56,7 @@ PORT = {"bus": 0, "chip": 1, "reading": "AB", "switches": [[0, 2]], "closed_high
     ],
 )
 def test_what_is_no_map_is_refused_by_name(data: bytes, reason: str) -> None:
-    with pytest.raises(BuildError, match=rf"^here\.json .*{reason}"):
+    with pytest.raises(BuildError, match=rf"^here\.json:? .*{reason}"):
         scanmap_from_bytes(data, "here.json")
 
 

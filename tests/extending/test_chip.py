@@ -1,13 +1,13 @@
 import csv
 import json
-import os
-import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from ..conftest import tool
 
 
 @pytest.mark.slow
@@ -30,9 +30,7 @@ def test_a_chip_of_another_package_is_proposed_specified_emulated_and_read(
     assert [row["maker"] for row in bill if row["part_number"] == "TCA9534PWR"] == ["Texas Instruments"]
     assert [row["quantity"] for row in bill if "without pull-ups" in row["note"]] == [str(kept)]
 
-    if shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    tool("umockdev-wrapper")
     lines, log = tmp_path / "lines.jsonl", tmp_path / "played.jsonl"
     run = (sys.executable, "-P", "-m", "thenar.cli", "run", build, "--glove", "{glove}", "--sink", f"jsonl:{lines}")
     package.thenar(

@@ -1,10 +1,7 @@
 import json
-import socket
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -13,6 +10,7 @@ import pytest
 from thenar.compiler import compile_build
 from thenar.compiler.recordings.graspset import Joint
 
+from ..sending import datagrams, free_port
 from .conftest import sixty
 
 HIGH = {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
@@ -26,24 +24,9 @@ def test_a_source_of_joints_of_ones_own_recognises_live(
     grasp_set = replace(sixty(switches, codes, ("flex_1", "flex_2")), joints=joints)
     build = compile_build(grasp_set, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
     (tmp_path / "mine.toml").write_text('name = "mine"\n')
-    package, done = install("source.py", "thenar.sources"), Event()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    package, port = install("source.py", "thenar.sources"), free_port()
     monkeypatch.setenv("FLEX_PORT", str(port))
-
-    def send() -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
-            while not done.is_set():
-                line.sendto(bytes(HIGH["pen"]), ("127.0.0.1", port))
-                time.sleep(0.01)
-
-    sender = Thread(target=send)
-    sender.start()
-    try:
+    with datagrams(port, lambda _number: bytes(HIGH["pen"])):
         told = package.thenar("run", str(build), "--glove", str(tmp_path / "mine.toml"), "--frames", "60")
-    finally:
-        done.set()
-        sender.join()
     lines = [json.loads(line) for line in told.splitlines()]
     assert (lines[-1]["grasp"], lines[-1]["health"]) == ("pen", "ok")

@@ -1,6 +1,5 @@
 """Integer tables of any size, and a build folder around them, without training anything; and results to publish."""
 
-import os
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
@@ -14,12 +13,17 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
+from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Calibration, Manifest
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Line
 from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Preshape, Quarantined
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sources.base import SOURCES
+from thenar.runtime.sources.rows import RowSource
 
+from ..conftest import lacking
 from ..tables import describe as _describe
 
 MakeTables = Callable[..., IntegerTables]
@@ -61,6 +65,15 @@ def eventually(condition: Callable[[], bool]) -> None:
     while not condition():
         assert monotonic() < end
         never.wait(0.002)
+
+
+def row_source(glove: str) -> RowSource:
+    """Return the one source of a glove with one stream, for all switches and taxels."""
+    harness = parse_harness(glove, "glove.toml")
+    scan = whole_scan(harness, harness.switches, every_taxel=True)
+    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    assert isinstance(source, RowSource)
+    return source
 
 
 @pytest.fixture(scope="session")
@@ -125,7 +138,7 @@ def make_grasp() -> MakeGrasp:
 def ros() -> ModuleType:
     """Return the messages of ROS, if Cyclone DDS is installed."""
     if find_spec("cyclonedds") is None:
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)("cyclonedds is missing")
+        lacking("cyclonedds")
     return import_module("thenar.runtime.ros_dds")
 
 

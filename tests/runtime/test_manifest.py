@@ -155,6 +155,7 @@ _WRONG: list[Callable[[Manifest], Manifest]] = [
     lambda m: replace(m, switches=(replace(m.switches[0], column=m.source.switches), *m.switches[1:])),
     lambda m: replace(m, switches=(replace(m.switches[0], column=m.switches[1].column), *m.switches[1:])),
     lambda m: replace(m, joints=(replace(m.joints[0], column=m.joints[1].column), *m.joints[1:])),
+    lambda m: replace(m, joints=(replace(m.joints[0], column=m.source.joints), *m.joints[1:])),
     lambda m: replace(m, joints=(replace(m.joints[0], code_b=m.joints[0].code_a), *m.joints[1:])),
     lambda m: replace(m, joints=(replace(m.joints[0], code_b=65536), *m.joints[1:])),
     lambda m: replace(m, joints=(replace(m.joints[0], value_b=1e301), *m.joints[1:])),

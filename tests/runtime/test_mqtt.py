@@ -19,15 +19,12 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.stream_probe import reader_of
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
-from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sinks import Fanout, GraspLine, HeaderLine, Line, SinkError, open_sink
 from thenar.runtime.sinks.jsonl import encode, encode_header, encode_health
-from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.mqtt import MqttReader
-from thenar.runtime.sources.rows import RowSource
 
 from ..conftest import tool
-from .conftest import eventually
+from .conftest import eventually, row_source
 
 MakeGrasp = Callable[..., LiveGrasp]
 WAIT_S = 20.0
@@ -221,10 +218,7 @@ def test_a_broker_that_is_not_there_or_wants_a_login_is_said(
 
 
 def test_messages_are_rows_and_a_broker_that_went_away_is_found_again(broker: Broker) -> None:
-    harness = parse_harness(GLOVE.format(port=f"{broker.place}/glove"), "glove.toml")
-    scan = whole_scan(harness, harness.switches, every_taxel=True)
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
-    assert isinstance(source, RowSource)
+    source = row_source(GLOVE.format(port=f"{broker.place}/glove"))
     with Other(broker, "nothing") as writer:
         writer.client.publish("glove", "1,1", retain=True).wait_for_publish(WAIT_S)
     for _ in range(2):

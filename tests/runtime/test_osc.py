@@ -5,7 +5,6 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 from itertools import count
-from threading import Event, Thread
 
 import pytest
 from hypothesis import given
@@ -24,6 +23,7 @@ from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.osc import OscParser, OscReader
 from thenar.runtime.sources.rows import RowSource
 
+from ..sending import datagrams, free_port
 from .conftest import eventually
 
 GLOVE = """
@@ -164,26 +164,12 @@ def test_a_second_sender_is_left_out_and_said(source: RowSource) -> None:
 
 
 def test_no_frame_is_proposed_for_messages_at_another_address() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        address = free.getsockname()
-    done = Event()
-
-    def send() -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as glove:
-            for number in count():
-                glove.sendto(message("/glove", number % 100, number % 7), address)
-                if done.wait(0.005):
-                    return
-
-    sending = Thread(target=send)
-    sending.start()
-    try:
-        with pytest.raises(DeviceError, match="the data holds no rows: a message at /glove"):
-            propose_glove(f"osc:127.0.0.1:{address[1]}/glow", 115_200, 0.5)
-    finally:
-        done.set()
-        sending.join()
+    port = free_port()
+    with (
+        datagrams(port, lambda number: message("/glove", number % 100, number % 7), 0.005),
+        pytest.raises(DeviceError, match="the data holds no rows: a message at /glove"),
+    ):
+        propose_glove(f"osc:127.0.0.1:{port}/glow", 115_200, 0.5)
 
 
 @given(st.lists(st.one_of(numbers, st.booleans(), st.integers(-(2**31), 2**31 - 1)), min_size=1, max_size=8))

@@ -96,9 +96,6 @@ def test_a_cut_that_leaves_nothing_is_refused_with_the_reason(n_rows: int, n_fol
         weka_folds([0] * n_rows, n_folds, 1)
 
 
-trial_numbers = st.lists(st.integers(-5, 30), min_size=2, max_size=60)
-
-
 def covers_once(folds: list[Fold], n: int) -> bool:
     tested = np.sort(np.concatenate([fold.test for fold in folds]))
     whole = all(np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(n)) for fold in folds)

@@ -2,27 +2,16 @@
 `benchmarks/luck.py`.
 """
 
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
-BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "luck.py"
-
-
-@pytest.fixture(scope="module")
-def luck() -> ModuleType:
-    spec = spec_from_file_location("luck", BENCHMARK)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from ...conftest import module_at
 
 
 @pytest.mark.slow
-def test_promised_intervals_cover_the_rates_of_hands_that_nobody_recorded(luck: ModuleType) -> None:
+def test_promised_intervals_cover_the_rates_of_hands_that_nobody_recorded() -> None:
+    luck = module_at(Path(__file__).parents[3] / "benchmarks" / "luck.py")
     cases = luck.cases(range(1, 7), "new subject", 1)
     assert len(cases) == 6
     assert sum(case.covered for case in cases) >= 0.9 * len(cases)

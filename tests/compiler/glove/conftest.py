@@ -4,12 +4,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import pytest
-
-from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Calibration, Manifest, Origin, Proof, Recognised, Switch
 from thenar.runtime.recipe import Recipe
-from thenar.simulator.handmaps.handmap import hand_map
 
 Tree = str | list["Tree"]
 
@@ -82,13 +78,6 @@ def read_netlist(data: bytes) -> Netlist:
         nodes = [(text_of(node, "ref"), text_of(node, "pin")) for node in children(net, "node")]
         assert nets.setdefault(text_of(net, "name"), nodes) is nodes
     return Netlist(components, frozenset(off_board), names, nets)
-
-
-@pytest.fixture(scope="session")
-def hand() -> HandShape:
-    shape = hand_map().fitted(hand_map().names)
-    assert shape is not None
-    return shape
 
 
 def manifest_of(names: Sequence[str], joints: bool = True) -> Manifest:

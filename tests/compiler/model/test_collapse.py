@@ -1,4 +1,3 @@
-import tracemalloc
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from thenar.runtime.model.terms.base import CoreTerm, Term
 from thenar.runtime.model.terms.bins import Bins
 from thenar.runtime.model.terms.line import Line
 
+from ...conftest import peak_bytes
 from .conftest import make_rows, make_stumps
 
 
@@ -108,11 +108,9 @@ def test_a_thousand_classes_are_collapsed_without_every_stump_writing_to_every_c
     random = np.random.default_rng(4)
     stumps = Stumps(9, random.integers(0, 9, (10, 1000)).astype(np.int32), random.random((10, 1000)),
                     random.normal(0, 1, (10, 1000, 3)), 1.0)  # fmt: skip
-    tracemalloc.start()
-    collapse(stumps, 9)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 10 * 1000**2  # written out, the answers of one branch alone are 80 MB
+    assert (
+        peak_bytes(lambda: collapse(stumps, 9)) < 10 * 1000**2
+    )  # written out, the answers of one branch alone are 80 MB
 
 
 @dataclass(frozen=True, eq=False)

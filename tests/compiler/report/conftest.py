@@ -21,7 +21,6 @@ from thenar.compiler.report.tryout import page_data
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.model.integers import tables_to_bytes
-from thenar.simulator.handmaps.handmap import hand_map
 
 from ...sets import grasp_set_of
 
@@ -33,13 +32,6 @@ NASTY = (
     "\"quotes\" & 'more' ${x} {{ 7 * 7 }} %{y}",
     "Griff ✊ 握り \u200d <!-- <script> \\u003c",
 )
-
-
-@pytest.fixture(scope="session")
-def hand() -> HandShape:
-    shape = hand_map().fitted(hand_map().names)
-    assert shape is not None
-    return shape
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,5 @@
 import os
 import select
-import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -37,10 +36,7 @@ for device in ("/dev/i2c-3", "/dev/i2c-5"):
 
 @pytest.fixture
 def umockdev() -> None:
-    if shutil.which("umockdev-wrapper") is None:
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(
-            "program umockdev-wrapper is missing"
-        )
+    tool("umockdev-wrapper")
 
 
 def client(emulated: EmulatedI2c, *command: str) -> str:

@@ -1,6 +1,5 @@
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -14,6 +13,8 @@ import pytest
 
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
 from thenar.drivers.emulated.i2c_wire import Place
+
+from ...conftest import tool
 
 DEVICE = "/dev/i2c-7"
 CLIENT = Path(__file__).with_name("bus_client.py")
@@ -90,9 +91,7 @@ class Rig:
 @pytest.fixture
 def rig(request: pytest.FixtureRequest) -> Iterator[Callable[..., Rig]]:
     """Return what makes a rig of chips (kind, address[, mux, channel]) on an adapter, with the bus open."""
-    if shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    tool("umockdev-wrapper")
     with ExitStack() as stack:
 
         def make(

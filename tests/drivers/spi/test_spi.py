@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -15,6 +14,8 @@ from thenar.drivers.emulated.i2c import EmulatedI2c
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.drivers.spi.device import SpiDevice
+
+from ...conftest import tool
 
 DEVICES = ("/dev/spidev0.0", "/dev/spidev0.1", "/dev/spidev1.0")
 
@@ -108,9 +109,7 @@ class Rig:
 @pytest.fixture
 def rig() -> Iterator[Rig]:
     """An MCP3208, an MCP3008, and a device node with nothing behind it."""
-    if shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    tool("umockdev-wrapper")
     kinds = ("mcp3208", "mcp3008", None)
     with EmulatedI2c([], dict(zip(DEVICES, kinds, strict=True))) as emulated:
         made = Rig(emulated)

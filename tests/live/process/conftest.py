@@ -1,7 +1,6 @@
 """`thenar run` in a process of its own, on emulated devices of every kind."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.sinks.jsonl import GraspLine, HealthLine, Line
 
+from ...conftest import tool
 from ..conftest import on_bench
 
 _line = msgspec.json.Decoder(Line)
@@ -141,9 +141,7 @@ def run(
     stage: Any, harness_of: Callable[..., Harness], make_scene: Any, tmp_path: Path
 ) -> Iterator[Callable[..., Run]]:
     """Return what puts up a bench for a build: `start` starts the client."""
-    if shutil.which("umockdev-wrapper") is None:
-        message = "program umockdev-wrapper is missing"
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    tool("umockdev-wrapper")
     with ExitStack() as stack:
 
         def make(inputs: str, *parts: str, glove: str = "") -> Run:

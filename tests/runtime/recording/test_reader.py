@@ -1,5 +1,4 @@
 import os
-import tracemalloc
 from collections.abc import Callable
 from contextlib import suppress
 from io import BytesIO
@@ -24,6 +23,8 @@ from thenar.runtime.recording.mcap import LARGEST_RECORD, MAGIC
 from thenar.runtime.recording.reader import OTHER_RECORDS, Reader
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
+
+from ...conftest import peak_bytes
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label
 Record = Callable[[Recorder, Entry], None]
@@ -81,23 +82,24 @@ def test_zeros_after_a_power_cut_are_left_out(recording: Path, entries: list[Ent
     assert (reader.end.whole, reader.end.reason) == (end, "no record begins there")
 
 
+def read_cheaply(path: Path) -> tuple[list[object], Reader]:
+    """Read a recording within four megabytes."""
+    done = list[tuple[list[object], Reader]]()
+    assert peak_bytes(lambda: done.append(read(path))) < 4_000_000
+    return done[0]
+
+
 @pytest.mark.parametrize("claimed", [2**63, 2**40, 2**31, LARGEST_RECORD + 1, 10_000])
 def test_a_length_that_is_damaged_takes_no_memory(recording: Path, claimed: int) -> None:
     data = bytearray(recording.read_bytes())
-    place = data.index(b"\x05", ends_of_records(bytes(data))[8])
     begin = next(end for end in ends_of_records(bytes(data)) if data[end] == 5)
     data[begin + 1 : begin + 9] = pack("<Q", claimed)
     recording.write_bytes(bytes(data))
-    assert place
-    tracemalloc.start()
-    found, reader = read(recording)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
+    found, reader = read_cheaply(recording)
     assert found == []
     assert reader.end is not None
     assert reader.end.whole == begin
     assert reader.end.reason.startswith(f"a record claims {claimed} bytes and ")
-    assert peak < 4_000_000
 
 
 def test_a_record_too_large_to_be_one_is_passed_over_unread(recording: Path, entries: list[Entry]) -> None:
@@ -108,13 +110,9 @@ def test_a_record_too_large_to_be_one_is_passed_over_unread(recording: Path, ent
         # A hole: it is as long as it says and takes no disk.
         file.seek(LARGEST_RECORD + 1, 1)
         file.write(data[first:])
-    tracemalloc.start()
-    found, reader = read(recording)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
+    found, reader = read_cheaply(recording)
     assert found == entries
     assert reader.foreign
-    assert peak < 4_000_000
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from itertools import count
 from pathlib import Path
-from threading import Event, Thread
 from types import ModuleType
 from typing import IO, Any
 
@@ -16,12 +15,12 @@ import pytest
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.stream_probe import propose_glove
-from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.ros import RosReader
 from thenar.runtime.sources.rows import RowSource
+
+from ...sending import sending
+from ..conftest import row_source
 
 DOMAIN = 78
 TALKER = Path(__file__).with_name("ros_talker.py")
@@ -63,11 +62,7 @@ def hear(talk: Talk) -> Iterator[Hear]:
 
         def heard(kind: str, options: str, values: Any, text: str) -> tuple[RowSource, list[SwitchFrame | GloveFrame]]:
             topic = _topic()
-            harness = parse_harness(text.format(port=f"ros:{topic}{options}"), "glove.toml")
-            scan = whole_scan(harness, harness.switches, every_taxel=True)
-            made = [source for kind in SOURCES.values() for source in kind.sources(harness, harness.switches, scan)]
-            (source,) = made
-            assert isinstance(source, RowSource)
+            source = row_source(text.format(port=f"ros:{topic}{options}"))
             stack.callback(source.close)
             source.open()
             sending = talk(topic, kind)
@@ -86,9 +81,7 @@ def hear(talk: Talk) -> Iterator[Hear]:
 
 def test_messages_of_a_second_publisher_are_left_out_and_said(talk: Talk) -> None:
     topic = _topic()
-    harness = parse_harness(f'[[stream]]\nport = "ros:{topic}"\njoints = {{ ring = [1, 255] }}\n', "glove.toml")
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, (), whole_scan(harness, ())))
-    assert isinstance(source, RowSource)
+    source = row_source(f'[[stream]]\nport = "ros:{topic}"\njoints = {{ ring = [1, 255] }}\n')
     source.open()
     try:
         first, second = talk(topic, "JointState"), talk(topic, "JointState")
@@ -131,23 +124,15 @@ def test_positions_of_a_joint_state_are_joints_by_their_names(hear: Hear) -> Non
 @pytest.mark.parametrize("kind", ["JointState", "Float32MultiArray"])
 def test_doctor_proposes_joints_for_a_joint_state_whatever_their_names_and_values(talk: Talk, kind: str) -> None:
     topic = _topic()
-    sending, done = talk(topic, kind), Event()
+    talking = talk(topic, kind)
 
-    def send() -> None:
-        for place in count():
-            positions = [float(place % 2), 0.25 * (place % 5), 0.5 if kind == "JointState" else 0.5 * (place % 2)]
-            stamped = {"stamp": [1_800_000_000, place], "name": ["ring", "thumb", "fsr"], "position": positions}
-            sending.write(json.dumps(stamped if kind == "JointState" else positions) + "\n")
-            if done.wait(0.01):
-                return
+    def send(place: int) -> None:
+        positions = [float(place % 2), 0.25 * (place % 5), 0.5 if kind == "JointState" else 0.5 * (place % 2)]
+        stamped = {"stamp": [1_800_000_000, place], "name": ["ring", "thumb", "fsr"], "position": positions}
+        talking.write(json.dumps(stamped if kind == "JointState" else positions) + "\n")
 
-    sender = Thread(target=send)
-    sender.start()
-    try:
+    with sending(send):
         found = propose_glove(f"ros:{topic}?type={kind}", 115_200, 0.5).harness.streams[0]
-    finally:
-        done.set()
-        sender.join()
     if kind == "JointState":
         assert list(found.joints) == ["ring", "thumb", "fsr"]
         assert not found.switches

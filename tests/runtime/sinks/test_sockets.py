@@ -1,7 +1,6 @@
 """Lines to several readers at a time, over real sockets: slow, hanging and vanishing ones among them."""
 
 import socket
-import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import count
@@ -14,6 +13,7 @@ from thenar.runtime.published import HealthReport, LiveGrasp
 from thenar.runtime.sinks import GraspLine, HealthLine, sockets
 from thenar.runtime.sinks.sockets import HANGING_S, MAX_READERS, SocketLines, open_tcp
 
+from ...conftest import peak_bytes
 from ..conftest import eventually
 
 MakeGrasp = Callable[..., LiveGrasp]
@@ -93,13 +93,13 @@ def test_one_that_never_reads_holds_up_nobody_and_costs_no_memory(
         sink.publish(grasp, None, None)
         assert reader.number() == 0
     assert sink.report().lost > 0
-    tracemalloc.start()
-    for number in range(2000):
-        sink.publish(make_grasp(number), None, None)
-        assert reader.number() == number
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 100_000
+
+    def publish() -> None:
+        for number in range(2000):
+            sink.publish(make_grasp(number), None, None)
+            assert reader.number() == number
+
+    assert peak_bytes(publish) < 100_000
     assert sink.report().readers == 2
 
 

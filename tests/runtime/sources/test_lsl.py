@@ -13,14 +13,12 @@ from msgspec.structs import replace
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.lsl import load_pylsl
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.published import JointAngles, LiveGrasp
-from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sinks import open_sink
-from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.lsl import LslReader
 
 from ...conftest import tool
+from ..conftest import row_source
 
 names = count()
 LONG_S = 20.0
@@ -66,9 +64,7 @@ def test_samples_are_rows_on_their_senders_clock(
     lsl: ModuleType, outlet: Outlet, name: str, labels: list[str] | None
 ) -> None:
     sender = outlet(2, labels)
-    harness = parse_harness(GLOVE.format(name=name), "glove.toml")
-    scan = whole_scan(harness, harness.switches, every_taxel=True)
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    source = row_source(GLOVE.format(name=name))
     source.open()
     frames: list[SwitchFrame] = []
     began, end = lsl.local_clock(), time.monotonic() + LONG_S
@@ -84,9 +80,7 @@ def test_samples_are_rows_on_their_senders_clock(
 
 def test_channels_with_other_labels_are_not_taken_by_their_order(outlet: Outlet, name: str) -> None:
     sender = outlet(2, ["finger", "palm"])
-    harness = parse_harness(GLOVE.format(name=name), "glove.toml")
-    scan = whole_scan(harness, harness.switches, every_taxel=True)
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    source = row_source(GLOVE.format(name=name))
     source.open()
     end = time.monotonic() + LONG_S
     while not source.fault_message():
@@ -114,9 +108,7 @@ def test_two_streams_of_one_name_are_said(outlet: Outlet, name: str) -> None:
 @pytest.mark.parametrize("stamp", [float("nan"), float("inf"), 1e305])
 def test_a_sample_whose_stamp_is_no_time_is_left_out(lsl: ModuleType, outlet: Outlet, name: str, stamp: float) -> None:
     sender = outlet(2)
-    harness = parse_harness(GLOVE.format(name=name), "glove.toml")
-    scan = whole_scan(harness, harness.switches, every_taxel=True)
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    source = row_source(GLOVE.format(name=name))
     source.open()
     frames, end = 0, time.monotonic() + LONG_S
     counts: dict[str, int] = {}

@@ -1,7 +1,6 @@
 """Grasps of contact.quasistatic against an independent program: the same hands and objects in MuJoCo."""
 
-import os
-from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -12,6 +11,7 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import CAPSULES, LIMITS_DEG, Hand, Size
 from thenar.simulator.effects.contact_quasistatic import Quasistatic
 
+from ...conftest import lacking, module_at
 from ..small import make_load
 
 THRESHOLD_N = 1.0
@@ -20,13 +20,8 @@ THRESHOLD_N = 1.0
 @pytest.fixture(scope="module")
 def oracle() -> ModuleType:
     if find_spec("mujoco") is None:
-        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)("mujoco is missing")
-    spec = spec_from_file_location("mujoco_oracle", Path(__file__).with_name("mujoco_oracle.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+        lacking("mujoco")
+    return module_at(Path(__file__).with_name("mujoco_oracle.py"))
 
 
 def test_every_body_lies_where_the_hand_says(oracle: ModuleType, planned: dict[str, tuple[Condition, ...]]) -> None:

@@ -1,5 +1,4 @@
 import gc
-import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +11,8 @@ from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.report import SimulationReport
 from thenar.simulator.pipeline.simulation import Simulation
 from thenar.simulator.scenes.scene import ListedEffect, Scene
+
+from ...conftest import peak_bytes
 
 
 def scene_of(name: str, repetitions: int, types: tuple[str, ...] = (), **changes: object) -> Scene:
@@ -101,14 +102,10 @@ def test_fresh_grasps_are_another_thing_than_another_seed_which_has_other_habits
 KEPT_BYTES = 2000
 
 
-def peak_bytes(scene: Scene) -> int:
+def memory_of(scene: Scene) -> int:
     simulate(scene, jobs=1, block=8)  # what is loaded and cached once is not counted
     gc.collect()  # nor does the peak depend on when the collector comes by
-    tracemalloc.start()
-    simulate(scene, jobs=1, block=8)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return peak
+    return peak_bytes(lambda: simulate(scene, jobs=1, block=8))
 
 
 @pytest.mark.slow
@@ -120,7 +117,7 @@ def test_memory_grows_by_what_is_kept_of_a_repetition_and_no_more(name: str) -> 
         for scene in (few, many)
     )
     # Two subjects: 96 repetitions more.
-    assert peak_bytes(many) - peak_bytes(few) < 96 * KEPT_BYTES
+    assert memory_of(many) - memory_of(few) < 96 * KEPT_BYTES
 
 
 def test_codes_are_on_one_scale_for_all_or_the_bare_bytes(quick: Simulation) -> None:
