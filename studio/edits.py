@@ -73,7 +73,7 @@ def last_action(edits: Sequence[Edit]) -> list[Edit]:
 
 
 def edits_shown(path: Path) -> dict[str, object]:
-    """Return what pages show of the log: the last action that can be taken back, in words, and what trials were made.
+    """Return for pages the last action that can be taken back, in words, and what became of trials.
 
     Raises RecordingError for a damaged log, and OSError.
     """

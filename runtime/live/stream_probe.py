@@ -25,7 +25,7 @@ from ..names import fault, list_names, nearest, shortened
 from ..sources.base import SOURCES
 from ..sources.rows import RowKind
 
-# What stands before the port of a CyberGlove, which sends nothing unless it is asked.
+# The prefix of the port of a CyberGlove, which sends nothing unless it is asked.
 CYBERGLOVE = "cyberglove:"
 # Boards that are reset when their port opens start their program within this time.
 _PATIENCE_US = 6_000_000
