@@ -179,20 +179,19 @@ def in_chromium(scene: Played, seconds: float, recording: Path) -> Iterator[tupl
                 pass_time = partial(fed, case, shown[2 * PAGE_HZ :])
             # Drivers cannot be called while frames are fed by this thread: what is measured is measured at both ends.
             driver.execute_script("seen = { ages: [], messages: 0, bytes: 0 }")
-            process = service.process.pid
-            heap, start, busy = heap_of(driver), time.perf_counter(), renderer_s(process)
+            before, start = metrics_of(driver), time.perf_counter()
             pass_time()
-            passed = time.perf_counter() - start
-            share, seen = (renderer_s(process) - busy) / passed, driver.execute_script("return seen")
+            passed, after = time.perf_counter() - start, metrics_of(driver)
+            seen = driver.execute_script("return seen")
             ages = np.percentile(seen["ages"] or [0], (50, 95))
             yield (
                 what,
                 f"{ages[0]:.0f} ms, {ages[1]:.0f} ms" if shown else "",
                 f"{len(seen['ages']) / passed:.0f}" if shown else "",
-                f"{share:.1%}",
+                f"{(after['ProcessTime'] - before['ProcessTime']) / passed:.1%}",
                 f"{seen['messages'] / passed:.0f}",
                 f"{seen['bytes'] / passed / 1e3:.0f} kB",
-                f"{heap:.1f} to {heap_of(driver):.1f} MB",
+                f"{before['JSHeapUsedSize'] / 1e6:.1f} to {after['JSHeapUsedSize'] / 1e6:.1f} MB",
             )
 
 
@@ -201,9 +200,7 @@ def played_back(recording: Path, build: Path) -> Iterator[Server]:
     """Serve the page of a recording."""
     with (
         Replay(recording, [build]) as replay,
-        Server(
-            "live", "127.0.0.1:0", token=None, on_message=lambda asked: replay.reply(asked["do"], asked.get("numbers"))
-        ) as server,
+        Server("live", "127.0.0.1:0", token=None, on_message=replay.reply) as server,
     ):
         server.publish("replay", replay.about)
         yield server
@@ -219,30 +216,12 @@ def fed(case: Case, frames: Sequence[tuple[int, bytes]]) -> None:
         case.step()
 
 
-def heap_of(driver: "WebDriver") -> float:
-    """Return the megabytes that the page's objects take after a collection of garbage."""
+def metrics_of(driver: "WebDriver") -> dict[str, float]:
+    """Return the measures of the page's process, by Chromium's names, after a collection of garbage."""
     driver.execute_cdp_cmd("HeapProfiler.collectGarbage", {})
     driver.execute_cdp_cmd("Performance.enable", {})
-    metrics = driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
-    return float(next(metric["value"] for metric in metrics if metric["name"] == "JSHeapUsedSize")) / 1e6
-
-
-def renderer_s(driver: int) -> float:
-    """Return the CPU time of the processes that draw the pages of a browser, by the process that started it."""
-    parents, spent = dict[int, int](), dict[int, float]()
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            number, fields = int(path.parent.name), path.read_text().rpartition(")")[2].split()
-            parents[number] = int(fields[1])
-            if b"--type=renderer" in (path.parent / "cmdline").read_bytes():
-                spent[number] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-        except OSError:  # it ended
-            continue
-
-    def ours(number: int) -> bool:
-        return number == driver or (number in parents and ours(parents[number]))
-
-    return sum(seconds for number, seconds in spent.items() if ours(number))
+    measures = driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    return {measure["name"]: measure["value"] for measure in measures}
 
 
 def main() -> None:

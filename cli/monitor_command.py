@@ -46,9 +46,7 @@ def command(recording: Path, builds: tuple[Path, ...], web: str, web_token: str 
     with (
         ended_by_signals() as stop,
         Replay(recording, builds) as replay,
-        Server(
-            "live", web, token=web_token, on_message=lambda asked: replay.reply(asked["do"], asked.get("numbers"))
-        ) as server,
+        Server("live", web, token=web_token, on_message=replay.reply) as server,
     ):
         server.publish("shell", shell_message(recording.name, builds[0], replay.manifest))
         server.publish("replay", replay.about)

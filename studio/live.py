@@ -113,7 +113,7 @@ class StudioLive:
         return self._replays[key][1]
 
     def _reply(self, asked: Asked) -> bytes:
-        return self._replay(asked.ids).reply(asked.do, asked.numbers)
+        return self._replay(asked.ids).reply({"do": asked.do, "numbers": asked.numbers})
 
     def _close(self) -> None:
         for _, replay in self._replays.values():

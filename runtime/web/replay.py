@@ -7,7 +7,7 @@ page asks for what it shows, and gets its own reply: no page moves another. What
 import os
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -98,15 +98,14 @@ class Replay(Closing):
         self._thread.join()
         self._kept.close()
 
-    def reply(self, do: object, numbers: object) -> bytes:
+    def reply(self, asked: Mapping[str, object]) -> bytes:
         """Return the reply to a page.
 
         Parameters
         ----------
-        do : object
-            "overview", for the changes and labels that the page has not got yet, or "moments".
-        numbers : object
-            Of the overview: how many changes of each build, and labels, it has. Of moments: the first time, the last,
+        asked : mapping
+            `do` is "overview", for the changes and labels that the page has not got yet, or "moments". `numbers` are,
+            of the overview, how many changes of each build, and labels, it has; of moments, the first time, the last,
             and their interval, in microseconds since 1970.
 
         Raises
@@ -114,6 +113,7 @@ class Replay(Closing):
         SettingError
             If the page asks for something else.
         """
+        do, numbers = asked.get("do"), asked.get("numbers")
         if do not in ("overview", "moments"):
             raise SettingError(f"a page can ask for the overview or for moments of a recording, not {str(do)[:20]!r}")
         count = 3 if do == "moments" else len(self._builds) + 1

@@ -68,9 +68,7 @@ def served(path: Path, *builds: Path, address: str = "127.0.0.1:0") -> Iterator[
     """Serve the page of a recording, as `thenar monitor` does."""
     with (
         Replay(path, builds) as replay,
-        Server(
-            "live", address, token=None, on_message=lambda asked: replay.reply(asked["do"], asked.get("numbers"))
-        ) as server,
+        Server("live", address, token=None, on_message=replay.reply) as server,
     ):
         server.publish("replay", replay.about)
         yield server

@@ -53,7 +53,7 @@ def replay(folder: Path, tmp_path: Path) -> Iterator[Callable[..., Replay]]:
 
 
 def asked(replay: Replay, do: str, *numbers: object) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(replay.reply(do, numbers))
+    found: dict[str, Any] = json.loads(replay.reply({"do": do, "numbers": numbers}))
     assert found["topic"] == do
     return found
 
@@ -178,11 +178,11 @@ def test_what_is_no_span_is_refused_in_a_sentence(replay: Callable[..., Replay],
     shown = replay(1, 2)
     for do in ("moments", "overview"):
         with pytest.raises(SettingError, match=f"for the {do} of a recording, a page must send . whole numbers"):
-            shown.reply(do, numbers if do == "moments" or numbers != (0, 1) else (0, 1, 2))
+            shown.reply({"do": do, "numbers": numbers if do == "moments" or numbers != (0, 1) else (0, 1, 2)})
     others: tuple[object, ...] = ("delete", "", None, 1, [], "x" * 10**6)
     for wrong in others:
         with pytest.raises(SettingError, match="a page can ask for the overview or for moments") as refusal:
-            shown.reply(wrong, (0, 1, 1))
+            shown.reply({"do": wrong, "numbers": (0, 1, 1)})
         assert len(str(refusal.value)) < 120
 
 
@@ -198,7 +198,7 @@ def test_whatever_span_is_asked_for_a_reply_is_bounded(
                 assert 1 <= len(found["frames"]) <= MOST_MOMENTS
             assert len(asked(shown, "overview", begin, end)["truth"]) <= 7
     monkeypatch.setattr(module, "MOST_BYTES", 2_000)
-    text = shown.reply("moments", (0, HUGE - 1, 1))
+    text = shown.reply({"do": "moments", "numbers": (0, HUGE - 1, 1)})
     largest = max(len(json.dumps(frame)) for frame in json.loads(text)["frames"])
     assert len(text) < 2_000 + largest + 200
 
