@@ -163,11 +163,12 @@ class ChoosePage:
     def _commands(self, files: Sequence[str], names: Sequence[str]) -> dict[str, str]:
         """Return the commands that do what the buttons do, by their requests, from these sets."""
         command, sets = self._project.command, [self._project.folder / name for name in files]
-        commands = {"curve": command(["place"], sets)}
+        options = self._project.options()
+        commands = {"curve": command(["place"], sets, options)}
         if names:
-            these = ["--sensors", len(names), "--have", ",".join(names)]
-            more = ["-o", self._project.new_path(_BUILD), *self._project.options(), *these]
-            commands |= {"measure": command(["place"], sets, these), "train": command(["compile"], sets, more)}
+            these = [*options, "--sensors", len(names), "--have", ",".join(names)]
+            output = ["-o", self._project.new_path(_BUILD), *these]
+            commands |= {"measure": command(["place"], sets, these), "train": command(["compile"], sets, output)}
         return commands
 
     def _measure(self, asked: Asked, names: tuple[str, ...], report: Report) -> dict[str, object]:

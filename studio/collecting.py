@@ -5,6 +5,7 @@ the keys that were pressed; it is the terminal or a page.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from threading import Event
@@ -26,6 +27,8 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.taxels import calibration_of
 from thenar.runtime.toml_source import read_source
 
+from .edits import EDITS_NAME, restore
+
 View = Callable[[CollectionGuide, Sequence[DeviceHealth]], Iterable[Key]]
 
 WAIT_US = 50_000
@@ -43,6 +46,8 @@ def collect(
     countdown_s: float = 3.0,
 ) -> int:
     """Lead through the trials of a collection until all are done or the user leaves.
+
+    What became of a trial in the log of edits next to the recording is taken back if the trial is undone.
 
     Parameters
     ----------
@@ -98,11 +103,18 @@ def collect(
         with Recorder(recording, session, tail=None if journal is None else journal.tail) as recorder:
             old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
             guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
+            # At first, for edits of an earlier recording of the same name.
+            known: Sequence[int] | None = None
             while guide.stage != "over" and not recorder.lost and recorder.failure is None and not stop.is_set():
                 arrived = sources.take(WAIT_US).arrived
                 sources.raise_settings()
                 devices = sources.devices()
                 guide.take(now_us(), arrived, [device.name for device in devices if not device.connected])
+                if guide.accepted != known:
+                    known = guide.accepted
+                    # What is wrong with the log is said by the page Choose, and ends no recording.
+                    with suppress(ThenarError, OSError):
+                        restore(recording.with_name(EDITS_NAME), recording.with_suffix(".grasps").name, {*known})
                 for key in view(guide, devices):
                     guide.press(now_us(), key)
     if recorder.failure is not None or recorder.lost:

@@ -16,6 +16,7 @@ from thenar.compiler.text import counted
 from thenar.drivers.errors import SettingError
 from thenar.runtime.files import sync_folder
 
+EDITS_NAME = "edits.jsonl"
 # Pages edit, and so does a collection, on another thread.
 _WRITING = Lock()
 
@@ -52,17 +53,20 @@ def undo(path: Path) -> None:
         _append(path, edits, [(edit.of, edit.new, edit.old) for edit in last], last[0].action)
 
 
-def restore(path: Path, name: str, kept: Container[int]) -> bool:
-    """Take back what became of the trials of the set `name` with other numbers than `kept`; return whether it was any.
+def restore(path: Path, name: str, kept: Container[int]) -> None:
+    """Take back what became of the trials of the set `name` with other numbers than `kept`.
 
     Their actions cannot be undone any more. Raises RecordingError for a damaged log, and OSError.
     """
     with _WRITING:
-        latest = {edit.of: edit for edit in load_edits(path)[0] if edit.set == name and edit.trial not in kept}
-        found = [edit for edit in latest.values() if edit.new != edit.grasp]
-        for edit in found:
-            _append(path, load_edits(path)[0], [(edit.of, edit.new, edit.grasp)], edit.action)
-        return bool(found)
+        edits = load_edits(path)[0]
+        latest = {edit.of: edit for edit in edits if edit.set == name and edit.trial not in kept}
+        for last in (edit for edit in latest.values() if edit.new != edit.grasp):
+            now, undone = last.new, {edit.undo for edit in edits}
+            for edit in edits:
+                if edit.of == last.of and not edit.undo and edit.action not in undone:
+                    _append(path, load_edits(path)[0], [(edit.of, now, edit.grasp)], edit.action)
+                    now = edit.grasp
 
 
 def last_action(edits: Sequence[Edit]) -> list[Edit]:

@@ -23,7 +23,7 @@ from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import fault, shortened
 
-from .edits import load_edits
+from .edits import EDITS_NAME, load_edits
 
 _STATE = "studio.json"
 # Bytes of a name, to which numbers and endings are added: file systems take 255.
@@ -145,7 +145,7 @@ class Project:
     @property
     def edits(self) -> Path:
         """The path of the log of edits, which may not be there."""
-        return self.folder / "edits.jsonl"
+        return self.folder / EDITS_NAME
 
     def command(self, words: Sequence[object], sets: Sequence[Path] = (), more: Sequence[object] = ()) -> str:
         """Return a command of thenar: its first `words`, the sets, and `more`.
@@ -154,10 +154,10 @@ class Project:
         """
         first, given = "", [*sets]
         if sets and (len(sets) > 1 or self.edits.exists()):
-            # Next to the project: in it, it would be one more set.
-            given = [self.folder.resolve().parent / f"{self.name}.grasps"]
+            # Next to the project: in it, it would be one more set. Commands that are run one after the other write it.
+            given = [self.folder.resolve().parent / f"{self.name}-merged.grasps"]
             edits = ["--edits", self.edits] if self.edits.exists() else []
-            first = f"{self.command(['merge', *sets, *edits, '-o', *given])} && "
+            first = f"{self.command(['merge', *sets, *edits, '--overwrite', '-o', *given])} && "
         return first + join(map(str, ["thenar", *words, *given, *more]))
 
     @property

@@ -172,8 +172,8 @@ class RecordPage:
         self, recording: Path, collection: Collection, journal: Journal | None = None, *, command: str = ""
     ) -> None:
         sitting = Sitting(self._studio, recording, collection, journal)
-        self._studio.publish("record-command", command=command)
         self._studio.station.start("recording", partial(self._lead, sitting), KEYS)
+        self._studio.publish("record-command", command=command)
 
     def _lead(self, sitting: "Sitting", stop: Event) -> None:
         """Lead a collection, and write the set of all its accepted trials when it ends."""
@@ -264,10 +264,8 @@ class Sitting:
                 self._captured[guide.trial.number] = guide.captured
             if guide.accepted != self._accepted:
                 self._accepted = guide.accepted
-                # What is wrong with the log is said by Choose, and ends no recording.
-                with suppress(ThenarError, OSError):
-                    if restore(self._project.edits, self.output.name, {*self._accepted}):
-                        self._studio.changed()
+                # Those of trials that were undone are taken back.
+                self._studio.show_edits()
                 self.tell()
         if step != guide.step or now >= shown_us + _SHOW_US:
             self._shown = guide.step, now
@@ -355,6 +353,8 @@ class Sitting:
             if grasp not in self._taxonomy.types:
                 raise SettingError(self._taxonomy.unknown(grasp))
         change(self._project.edits, [self._id(self.trials[number])], new)
+        # It may have been undone meanwhile.
+        restore(self._project.edits, self.output.name, {*(self._accepted or ())})
 
 
 @lru_cache(maxsize=1024)

@@ -13,7 +13,7 @@ from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Any
 
@@ -141,9 +141,7 @@ class Studio(Closing):
         with suppress(ThenarError, OSError):
             built = self.project.build()
             about = () if built is None else (built[0], built[1].manifest)
-        # And what is wrong with the log of edits, by Choose.
-        with suppress(ThenarError, OSError):
-            self.publish("edits", edits_shown(self.project.edits))
+        self.show_edits()
         shell = shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer)
         self.server.publish("shell", shell)
         self._show_members()
@@ -152,9 +150,16 @@ class Studio(Closing):
             self._stale = True
             self._queue.put(("reading", self._read))
 
+    def show_edits(self) -> None:
+        """Show the log of edits. What is wrong with it is said by Choose."""
+        with suppress(ThenarError, OSError):
+            self.publish("edits", edits_shown(self.project.edits))
+
     def _read(self, report: Report) -> None:
         """Let every page read the project. Raises the first error once all have tried."""
         self._stale, wrong = False, list[Exception]()
+        # Again: of two threads that showed it at the same time, the later one may have read it first.
+        self.show_edits()
         for read in self._readers:
             try:
                 read(report)
@@ -243,6 +248,7 @@ class Station:
     def __init__(self, publish: Callable[..., None]) -> None:
         self._publish, self._stop = publish, Event()
         self._thread: Thread | None = None
+        self._changing = Lock()
         self._keys, self._pressed = tuple[str, ...](), SimpleQueue[str]()
         self.doing = ""
         self._tell("")
@@ -251,16 +257,17 @@ class Station:
         """End what uses the glove, and then start this: `work` gets an event that is set when it is to end.
 
         It takes these `keys`, which pages press. Returns at once: a device may take seconds to end. Raises SettingError
-        during a recording, which is only ended on its page.
+        during a recording, which is only ended on its page, and during a run for what is no recording.
         """
-        if self.doing == "recording":
-            raise SettingError("the glove is in use: recording; end that first")
-        self._stop.set()
-        self._stop, self.doing = Event(), doing
-        self._keys, self._pressed = tuple(keys), SimpleQueue()
-        follow = partial(self._run, doing, work, self._stop, self._thread)
-        self._thread = Thread(target=follow, name=f"thenar {doing}", daemon=True)
-        self._thread.start()
+        with self._changing:
+            if self.doing == "recording" or (self.doing == "live" and doing != "recording"):
+                raise SettingError(f"the glove is in use: {self.doing}; end that first")
+            self._stop.set()
+            self._stop, self.doing = Event(), doing
+            self._keys, self._pressed = tuple(keys), SimpleQueue()
+            follow = partial(self._run, doing, work, self._stop, self._thread)
+            self._thread = Thread(target=follow, name=f"thenar {doing}", daemon=True)
+            self._thread.start()
 
     def press(self, key: str) -> None:
         """Press a key for what uses the glove. Raises SettingError if it does not take this."""
@@ -270,7 +277,8 @@ class Station:
 
     def pressed(self) -> list[Any]:
         """Return the keys that were pressed since the last call."""
-        return [self._pressed.get() for _ in range(self._pressed.qsize())]
+        pressed = self._pressed
+        return [pressed.get() for _ in range(pressed.qsize())]
 
     def stop(self) -> None:
         """Let what uses the glove end soon."""
@@ -292,8 +300,9 @@ class Station:
                 work(stop)
         except Exception as reason:
             why = _sentence(reason)
-        if stop is self._stop:
-            self.doing, self._keys = "", ()
+        with self._changing:
+            if stop is self._stop:
+                self.doing, self._keys = "", ()
         self._tell(self.doing, why)
 
     def _tell(self, doing: str, why: str = "") -> None:

@@ -57,7 +57,7 @@ class PointSetting(Struct, frozen=True, forbid_unknown_fields=True, omit_default
     """All choices of a point: the input of `compile --from`.
 
     rounds      None for a trainer without rounds
-    width       bits that every sum fits; table_bits: 8 if firmware may store a byte per entry
+    width       bits that every sum fits; table_bits: 8 if a byte is enough for an entry of a line
     wiring      "as wired" (the given glove.toml), "board" (one that prints rows) or a kind of port expander; clock_hz
                 of its bus, or baud of the board's line; 0 if no switch is read
     trainer     of the model, and its `settings` that are not defaults; the paper's is not written

@@ -20,7 +20,7 @@ from .points import FrontierError, PlacementChoice
 
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 PAPERS_ROUNDS = 100  # no point of our frontiers has more
-# The shapes of integer tables: the bits that every sum fits; and one in which a byte is enough for an entry.
+# The shapes of integer tables: the bits that every sum fits; and one in which a byte is enough for an entry of a line.
 SHAPES = (*(Recipe(width=width) for width in (16, 12, 8, 6, 5, 4)), Recipe(table_bits=8))
 # The numbers of levels of each taxel to choose from, at most.
 TAXEL_LEVELS = (1, 3, LEVELS)

@@ -26,6 +26,8 @@ from .server import Server, message
 _MOST_CHANGES = 6_000
 # A moment is current for half a second, or for three periods of its source.
 _SILENT_US, _PERIODS = 500_000, 3
+# A clock that differs by more was set: to a later time, or back, where the past begins anew.
+_SET_US = 1_000_000
 # The glove is looked at so often; what is said of it is repeated once a second, and is not known when it was not.
 _LOOK_US, _LASTS_S = 200_000, 3
 # What a timeline shows of a prediction: its time since 1970, the announced type, "degraded" or "unknown" health, and
@@ -57,10 +59,10 @@ class LivePage:
 
     def __init__(self, server: Server, glove: Glove, folder: Path, after: "LivePage | None" = None) -> None:
         self.server, self._glove = server, glove
-        self._frames = FrameText(glove.system.build, glove.system.harness)
-        self._health: HealthReport | None = None
         # Where the monotonic clock of moments began, since 1970.
         self._clock_us = time_ns() // 1000 - now_us()
+        self._frames = FrameText(glove.system.build, glove.system.harness)
+        self._health: HealthReport | None = None
         # For pages opened later.
         self._past: Past = Past() if after is None else after._past
         self._past.silent_us = silent_us(glove.sources.switch_period_us, glove.sources.glove_period_us)
@@ -74,6 +76,11 @@ class LivePage:
     def show(self, moment: Moment) -> None:
         """Show the moment that the glove has just published. For the thread of the run."""
         grasp, glove = moment.grasp, self._glove
+        set_by_us = grasp.unix_us - grasp.time_us - self._clock_us
+        if abs(set_by_us) > _SET_US:
+            self._clock_us += set_by_us
+            if set_by_us < 0:
+                self._past.changes, self._past.until_us = [], 0
         self.server.publish("frame", partial(self._frames, moment, self._clock_us))
         self._past.take(change_of(grasp, self._clock_us))
         del self._past.changes[:-_MOST_CHANGES]

@@ -166,6 +166,8 @@ class Replay(Closing):
             for entry in self._reader:
                 if self._stop.is_set():
                     return
+                # A moment has the clock of its session.
+                newest = None if isinstance(entry, Session) else newest
                 newest = self._take(entry, [stepper.take(entry) for stepper in steppers]) or newest
             if newest is not None and self._clock_us + newest.grasp.time_us > self._times[-1]:
                 self._keep(newest)

@@ -205,4 +205,8 @@ $("relabel").addEventListener("submit", (event) => {
 });
 $("drop").addEventListener("click", () => ask("relabel", { trial: seen, name: "" }));
 $("undo").addEventListener("click", () => ask("undo"));
+// After a click of the mouse, Enter is the key of the recording again.
+$("so-far").addEventListener("click", ({ target, detail }) => {
+  if (stage !== "over" && detail) target.closest("button")?.blur();
+});
 $("train").addEventListener("click", () => ask("train", { sensors: [...Array(sensors).keys()] }));

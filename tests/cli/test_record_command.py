@@ -22,8 +22,9 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.recording.guide import read_journal
+from thenar.runtime.recording.guide import planned, read_journal
 from thenar.runtime.taxels import TaxelCalibration, TaxelLine
+from thenar.studio.edits import change, load_edits
 
 from .conftest import refusal
 
@@ -226,6 +227,25 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
     code, text = third.finish()
     assert code == 0, text
     assert "4 of 4 trials are done" in text
+
+
+def test_a_trial_that_is_undone_loses_its_edit(folder: Path, start: Start) -> None:
+    """As on the page Record: the next trial of its number is another one."""
+    terminal = start("--seed", "5", "--no-none")
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    reviewed(terminal, 1)
+    terminal.press(b"\r")
+    reviewed(terminal, 2)
+    journal, log = read_journal(folder / "set.mcap"), folder / "edits.jsonl"
+    assert journal.session.collection is not None
+    first = planned(journal.session.collection)[0]
+    change(log, [("set.grasps", "A", "1", first.grasp, first.object, 1)], "")
+    terminal.press(b"u")
+    terminal.until(rb"1 of 4: ")
+    terminal.press(b"q")
+    terminal.finish()
+    assert [edit.new for edit in load_edits(log)[0]] == ["", first.grasp]
 
 
 def test_pads_are_recorded_with_the_rest(

@@ -289,9 +289,9 @@ def test_sets_are_used_left_aside_and_said_not_to_fit(
     browser.click("add")
     counts(browser, 1)
     command = browser.text("train-command")
-    merged = f"{tmp_path}/recorded.grasps"
+    merged = f"{tmp_path}/recorded-merged.grasps"
     sets = f"{folder}/more.grasps {folder}/set.grasps"
-    assert command.startswith(f"thenar merge {sets} -o {merged} && thenar compile {merged} -o ")
+    assert command.startswith(f"thenar merge {sets} --overwrite -o {merged} && thenar compile {merged} -o ")
     boxes = browser.driver.find_elements(By.CSS_SELECTOR, "#sets input")
     for name in (0, 1, 3):
         boxes[name].send_keys(Keys.SPACE)
@@ -313,16 +313,17 @@ def test_the_commands_apply_the_edits_and_measure_the_same(
     commands = reply(opened, {"do": "choose", "sensors": [0, 8]}, "quick")["commands"]
     merge, compiled = commands["train"].split(" && ")
     sets = f"{folder}/set.grasps --edits {folder}/edits.jsonl"
-    assert merge == f"thenar merge {sets} -o {tmp_path}/recorded.grasps"
-    assert compiled.startswith(f"thenar compile {tmp_path}/recorded.grasps -o {folder}/build ")
+    merged = tmp_path / "recorded-merged.grasps"
+    assert merge == f"thenar merge {sets} --overwrite -o {merged}"
+    assert compiled.startswith(f"thenar compile {merged} -o {folder}/build ")
     assert run(merge.split()[1:]) == 0
-    clean = GraspSet.load(tmp_path / "recorded.grasps")
+    clean = GraspSet.load(merged)
     assert (
         clean.fingerprint()
         == opened.project.recordings()[0].fingerprint()
         == people.rows(np.arange(5, 72)).fingerprint()
     )
-    assert commands["curve"] == f"{merge} && thenar place {tmp_path}/recorded.grasps"
+    assert commands["curve"] == f"{merge} && thenar place {merged}"
     capsys.readouterr()
     assert run([*commands["measure"].split(" && ")[1].split()[1:], "--json"]) == 0
     (point,) = json.loads(capsys.readouterr().out)["points"]

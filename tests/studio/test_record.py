@@ -268,6 +268,8 @@ def test_trials_are_edited_while_the_recording_goes_on(
     browser.picture("record-edit")
     browser.click("undo")
     browser.wait(lambda: strip(browser)[0].endswith(f" → {new}"))
+    # Enter is the key of the recording again, and no second undo.
+    assert browser.script("return document.activeElement === document.body")
     browser.click("undo")
     browser.wait(lambda: strip(browser) == plain)
     assert not browser.driver.find_element(By.ID, "undo").is_enabled()

@@ -144,7 +144,8 @@ export class Timeline {
     const [track] = this.tracks, known = track.untilUs ?? -1;
     if (until < known) return; // changes that were sent before passed it
     if (known >= 0 && changes[0][0] - known > this.#silent) track.end();
-    for (const change of changes) if (change[0] > known) track.take(change);
+    // A silence begins when the last moment before it ended.
+    for (const change of changes) if (change[0] > known || (change[0] === known && !change[1])) track.take(change);
     track.untilUs = until;
     for (const lane of [track.announced, track.segments, track.health]) {
       const gone = lane.findIndex((span, at) => span.to > until - KEPT_US && at >= lane.length - MOST_SPANS);

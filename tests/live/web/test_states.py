@@ -228,6 +228,22 @@ _KEPT = """const [count, us, done] = arguments;
     });"""
 
 
+# Where the spans of a type begin and end on a page that lost the server during a silence, and got the past later.
+_SILENT = """const [done] = arguments;
+    import("/timeline.js").then(({ Timeline }) => {
+      const timeline = new Timeline(document.createElement("canvas"), { moved() {}, toggle() {} });
+      const at = (time, grasp) => [time, grasp, "", "", null];
+      for (const time of [0, 100_000]) timeline.follow([at(time, "Add")], time);
+      timeline.follow([at(0, "Add"), at(100_000, ""), at(5_000_000, "Add")], 5_000_000);
+      done(timeline.tracks[0].announced.map(({ from, to }) => [from, to === Infinity ? null : to]));
+    });"""
+
+
+def test_a_silence_that_a_page_missed_is_empty(page: Callable[..., Run], browser: Any) -> None:
+    page()
+    assert browser.driver.execute_async_script(_SILENT) == [[0, 100_000], [5_000_000, None]]
+
+
 def test_the_past_that_a_page_keeps_is_bounded(page: Callable[..., Run], browser: Any) -> None:
     run = page()
     *counts, seconds = browser.driver.execute_async_script(_KEPT, 60_000, 100_000)

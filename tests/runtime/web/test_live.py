@@ -134,10 +134,10 @@ def test_the_past_holds_changes_alone_and_marks_silence(
         (1.4, {"state": "releasing", "segment_us": 1_150_000, "segment_type": "hook", "health": "degraded"}),
         (9.0, {}),
     )
-    for time_s, changes in seconds:
-        moment = replace(grasp, time_us=round(1e6 * time_s), **changes)
-        page.show(Moment(moment, None, None, None))
     clock_us = page._clock_us
+    for time_s, changes in seconds:
+        time_us = round(1e6 * time_s)
+        page.show(Moment(replace(grasp, time_us=time_us, unix_us=clock_us + time_us, **changes), None, None, None))
     assert time() - 1e-6 * (clock_us + now_us()) == pytest.approx(0, abs=1)
     assert told_past(server) == {
         "topic": "past",
@@ -154,6 +154,27 @@ def test_the_past_holds_changes_alone_and_marks_silence(
     after = LivePage(server, glove, folder, page)
     assert len(told_past(server)["changes"]) == 5
     for number in range(2 * module._MOST_CHANGES):
-        kind = ("hook", "pinch")[number % 2]
-        after.show(Moment(replace(grasp, time_us=10_000_000 + number, grasp=kind), None, None, None))
+        kind, time_us = ("hook", "pinch")[number % 2], 10_000_000 + number
+        moment = replace(grasp, time_us=time_us, unix_us=after._clock_us + time_us, grasp=kind)
+        after.show(Moment(moment, None, None, None))
     assert len(told_past(server)["changes"]) == module._MOST_CHANGES
+
+
+def test_times_follow_a_clock_that_is_set(
+    folder: Path, serve: Callable[..., Any], make_grasp: Callable[..., LiveGrasp]
+) -> None:
+    """An hour later the past goes on; an hour earlier it begins anew; a drift of less than a second changes none."""
+    server, glove = serve().server, glove_of(folder, "tcp://127.0.0.1:1")
+    page = LivePage(server, glove, folder)
+    grasp, begun_us = replace(make_grasp(), health="ok", state="none", segment_us=None), page._clock_us
+    hour_us, found = 3_600_000_000, list[list[tuple[int, str]]]()
+    shown = (("hook", 0), ("pinch", hour_us), ("hook", hour_us + 999_999), ("pinch", 0))
+    for number, (kind, set_us) in enumerate(shown):
+        time_us = 100_000 * (1 + number)
+        moment = replace(grasp, grasp=kind, time_us=time_us, unix_us=begun_us + time_us + set_us)
+        page.show(Moment(moment, None, None, None))
+        found.append([(change[0] - begun_us, change[1]) for change in told_past(server)["changes"]])
+    first, silence = (100_000, "hook"), (100_000, "")
+    assert found[1] == [first, silence, (hour_us + 200_000, "pinch")]
+    assert found[2] == [*found[1], (hour_us + 300_000, "hook")]
+    assert found[3] == [(400_000, "pinch")]
