@@ -114,6 +114,9 @@ class ErrorsPage:
             try:
                 manifest = load_manifest(self._project.folder / member.name)
                 select_inputs(self._choose.recordings.quick.held, manifest)
+                if member.name == self._project.state.build:
+                    # Here pages do not wait for it, if recordings are long.
+                    self._reading(member.id)
                 builds.append(member)
             except (ThenarError, OSError) as reason:
                 unused.append(f"build {member.name} is left out: {reason}")
