@@ -103,7 +103,7 @@ def collect(
         with Recorder(recording, session, tail=None if journal is None else journal.tail) as recorder:
             old_us = old_after_us(sources.switch_period_us, sources.glove_period_us)
             guide = CollectionGuide(trials, recorder, round(countdown_s * 1e6), accepted, old_us)
-            # At first, for edits of an earlier recording of the same name.
+            # None at first: edits of an earlier recording of the same name are taken back, too.
             known: Sequence[int] | None = None
             while guide.stage != "over" and not recorder.lost and recorder.failure is None and not stop.is_set():
                 arrived = sources.take(WAIT_US).arrived

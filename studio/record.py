@@ -264,7 +264,7 @@ class Sitting:
                 self._captured[guide.trial.number] = guide.captured
             if guide.accepted != self._accepted:
                 self._accepted = guide.accepted
-                # Those of trials that were undone are taken back.
+                # Edits of trials that were undone are taken back.
                 self._studio.show_edits()
                 self.tell()
         if step != guide.step or now >= shown_us + _SHOW_US:

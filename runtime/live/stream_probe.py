@@ -111,7 +111,7 @@ def propose_glove(port: str, baud: int, listen_s: float, columns: Sequence[str] 
         counts, odd = parser.counts, parser.odd
         other = other or f"frames of {frame}: bytes that never changed are taken as fixed, so move every sensor"
     if not came:
-        silent = "no data received" + (f"; of a CyberGlove, the port is {CYBERGLOVE}{port}" if is_serial(port) else "")
+        silent = "no data received" + (f"; if it is a CyberGlove, write {CYBERGLOVE}{port}" if is_serial(port) else "")
         raise DeviceError(f"{port}: {_no_rows(bare, reader) or other or silent}")
     wrong, such = counts.misfits + counts.overlong, f", such as {odd}" if odd else ""
     remarks = [f"{wrong} lines were not rows{such}" if wrong > 1 else f"1 line was not a row: {odd}"] if wrong else []

@@ -116,4 +116,4 @@ def test_the_proposal_for_a_cyberglove_is_one_that_doctor_accepts(
 def test_silence_on_a_serial_port_hints_at_a_cyberglove(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream_probe, "_PATIENCE_US", 500_000)
     said = refusal("doctor", "--line", f"{tmp_path}/port", "--seconds", "0.5")
-    assert f"of a CyberGlove, the port is cyberglove:{tmp_path}/port" in said
+    assert f"if it is a CyberGlove, write cyberglove:{tmp_path}/port" in said

@@ -159,6 +159,17 @@ def reviewed(terminal: Terminal, number: int) -> None:
         terminal.press(b"\r")
 
 
+def at_the_second_trial(start: Start) -> Terminal:
+    """Begin a collection whose first trial is accepted and whose second one is there to judge."""
+    terminal = start("--seed", "5", "--no-none")
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    reviewed(terminal, 1)
+    terminal.press(b"\r")
+    reviewed(terminal, 2)
+    return terminal
+
+
 def command_of(folder: Path, *more: object) -> list[str]:
     """Return the command that records in a folder without a terminal."""
     options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps", *more]
@@ -200,12 +211,7 @@ def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, board: Boa
 
 
 def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start: Start) -> None:
-    first = start("--seed", "5", "--no-none")
-    first.until(rb"Enter: start the countdown")
-    first.press(b"\r")
-    reviewed(first, 1)
-    first.press(b"\r")
-    reviewed(first, 2)
+    first = at_the_second_trial(start)
     os.killpg(first.process.pid, signal.SIGKILL)
     first.process.wait()
     assert read_journal(folder / "set.mcap").accepted == (1,)
@@ -231,12 +237,7 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
 
 def test_a_trial_that_is_undone_loses_its_edit(folder: Path, start: Start) -> None:
     """As on the page Record: the next trial of its number is another one."""
-    terminal = start("--seed", "5", "--no-none")
-    terminal.until(rb"Enter: start the countdown")
-    terminal.press(b"\r")
-    reviewed(terminal, 1)
-    terminal.press(b"\r")
-    reviewed(terminal, 2)
+    terminal = at_the_second_trial(start)
     journal, log = read_journal(folder / "set.mcap"), folder / "edits.jsonl"
     assert journal.session.collection is not None
     first = planned(journal.session.collection)[0]

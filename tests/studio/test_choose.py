@@ -66,6 +66,9 @@ def test_sensors_are_chosen_on_the_hand_and_in_the_list(browser: Browser, studio
     assert browser.text("train-command") == (
         f"thenar compile {folder}/set.grasps -o {folder}/build --prices {folder}/prices.toml --sensors 1 --have {name}"
     )
+    options = f"--prices {folder}/prices.toml"
+    assert browser.text("measure-command") == f"thenar place {folder}/set.grasps {options} --sensors 1 --have {name}"
+    assert browser.text("curve-command") == f"thenar place {folder}/set.grasps {options}"
     assert browser.text("price") == "2.50"
     assert browser.text("scan").endswith("µs on the wire")
     boxes[-1].send_keys(Keys.SPACE)

@@ -162,6 +162,23 @@ def test_a_station_waits_for_no_device_and_a_recording_is_ended_by_nobody() -> N
     assert told["station"] == message("station", doing="", why="")
 
 
+def test_a_run_is_ended_by_a_recording_alone_which_takes_its_keys() -> None:
+    def work(stop: Event) -> None:
+        stop.wait()
+
+    station = Station(lambda *_, **__: None)
+    station.start("live", work)
+    for other in ("watching", "looking", "calibrating", "live"):
+        with pytest.raises(SettingError, match="in use: live"):
+            station.start(other, work)
+    station.start("recording", work, ("accept",))
+    station.press("accept")
+    with pytest.raises(SettingError, match="no key 'quit' now"):
+        station.press("quit")
+    assert station.pressed() == ["accept"]
+    station.close()
+
+
 def test_a_bug_frees_the_glove_and_ends_no_studio(studio: Start, caplog: pytest.LogCaptureFixture) -> None:
     def fail(*_: object) -> None:
         raise ZeroDivisionError

@@ -144,7 +144,7 @@ export class Timeline {
     const [track] = this.tracks, known = track.untilUs ?? -1;
     if (until < known) return; // changes that were sent before passed it
     if (known >= 0 && changes[0][0] - known > this.#silent) track.end();
-    // A silence begins when the last moment before it ended.
+    // A silence begins at the last moment before it.
     for (const change of changes) if (change[0] > known || (change[0] === known && !change[1])) track.take(change);
     track.untilUs = until;
     for (const lane of [track.announced, track.segments, track.health]) {
