@@ -96,12 +96,6 @@ def log(x: Floats) -> Floats:
     return (f - s * (f - square * series)) + exponent * _LN2_LOW + exponent * _LN2_HIGH
 
 
-def _log_of_one_and(x: Floats) -> Floats:
-    """Return ln(1 + x) for x >= 0, any shape, corrected by the exact rounding error of 1 + x."""
-    whole = 1.0 + x
-    return log(whole) + (x - (whole - 1.0)) / whole
-
-
 def add_up(rows: Floats) -> Floats:
     """Return the sum over axis 0 of (K, n), added strictly in order of the rows."""
     total: Floats = rows[0].copy()
@@ -158,7 +152,10 @@ def softmax_and_losses(scores: Floats, labels: NDArray[np.intp]) -> tuple[Floats
     total = add_up(odds)
     shares = odds / total
     gap, odds[own] = top - scores[own], 0.0
-    return shares, np.where(gap == 0.0, _log_of_one_and(add_up(odds)), log(total) + gap)
+    # Of the likeliest class, the loss is ln(1 + the others' odds), corrected by the exact rounding error of that sum.
+    others, likeliest = add_up(odds), gap == 0.0
+    total = np.where(likeliest, 1.0 + others, total)
+    return shares, log(total) + np.where(likeliest, (others - (total - 1.0)) / total, gap)
 
 
 def sincos(x: Floats) -> tuple[Floats, Floats]:

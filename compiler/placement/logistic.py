@@ -11,8 +11,9 @@ from ..elementary import SUM_BITS, Floats, dot, exact_sum, softmax_and_loss
 RIDGE = 1.0
 # Inputs that are no bits are multiples of 2^-MARK_BITS, of a magnitude of at most 2^REACH_BITS.
 MARK_BITS, REACH_BITS = 5, 3
-# Pairs of steps that L-BFGS remembers.
+# Steps that L-BFGS remembers: how rows moved, how the gradient turned, and the product of both.
 _MEMORY = 6
+_Pair = tuple[Floats, Floats, float]
 # Rows are multiples of 2^-28, below 2^24 in sum (2^16 if inputs are no bits), so every sum of them is exact.
 _ROW_BITS = 28
 _ENOUGH = 1e-4  # of the slope, for Armijo's rule
@@ -45,7 +46,7 @@ class Logistic:
         self._labels, self._ridge = labels, ridge
         self._member = (labels == np.arange(n_classes)[:, np.newaxis]).astype(np.float64)
         self._residual_bits = SUM_BITS - n.bit_length() - (0 if inputs.dtype == bool else MARK_BITS + REACH_BITS)
-        self._pairs: list[tuple[Floats, Floats]] = []
+        self._pairs: list[_Pair] = []
         self._stand(np.zeros((len(self._inputs), n_classes)))
 
     def improve(self, iterations: int, tolerance: float = 0.0) -> None:
@@ -67,7 +68,8 @@ class Logistic:
         """Return the fit without some columns; the bias absorbs the means of their rows."""
         rest = copy(self)
         rest._inputs = np.delete(self._inputs, columns, axis=0)
-        rest._pairs = [(np.delete(s, columns, axis=0), np.delete(y, columns, axis=0)) for s, y in self._pairs]
+        pairs = ((np.delete(s, columns, axis=0), np.delete(y, columns, axis=0)) for s, y, _ in self._pairs)
+        rest._pairs = [(s, y, dot(s, y)) for s, y in pairs]
         rows = np.delete(self.rows, columns, axis=0)
         for column in columns:
             rows[-1] += self.rows[column] * (exact_sum(self._inputs[column]) / self._labels.size)
@@ -100,8 +102,8 @@ class Logistic:
                 before, gradient = self.rows, self._gradient
                 self._stand(rows, evaluated)
                 moved, turned = self.rows - before, self._gradient - gradient
-                if dot(moved, turned) > 0:
-                    self._pairs = [*self._pairs, (moved, turned)][-_MEMORY:]
+                if (curvature := dot(moved, turned)) > 0:
+                    self._pairs = [*self._pairs, (moved, turned, curvature)][-_MEMORY:]
                 return True
             length *= 0.5
         return False
@@ -109,14 +111,14 @@ class Logistic:
     def _direction(self) -> Floats:
         """Return minus the gradient times the inverse Hessian estimated from past steps and gradient changes."""
         q = self._gradient.copy()
-        pairs = [(s, y, dot(s, y)) for s, y in self._pairs]
-        pairs = [pair for pair in pairs if pair[2] > 0]
+        pairs = [pair for pair in self._pairs if pair[2] > 0]
         weights = []
         for s, y, curvature in reversed(pairs):
             weights.append(dot(s, q) / curvature)
             q -= weights[-1] * y
         if pairs:
-            q *= pairs[-1][2] / dot(pairs[-1][1], pairs[-1][1])
+            _, y, curvature = pairs[-1]
+            q *= curvature / dot(y, y)
         for (s, y, curvature), weight in zip(pairs, reversed(weights), strict=True):
             q += (weight - dot(y, q) / curvature) * s
         return -q

@@ -11,7 +11,6 @@ from hypothesis.extra.numpy import arrays
 from scipy.linalg import solve_triangular
 
 from thenar.compiler.elementary import (
-    _log_of_one_and,
     add_up,
     backward,
     cholesky,
@@ -20,6 +19,7 @@ from thenar.compiler.elementary import (
     log,
     sincos,
     softmax_and_loss,
+    softmax_and_losses,
 )
 from thenar.stability.reference import boosting as logistic
 from thenar.stability.reference.numbers import exact, precisely, ulps
@@ -55,12 +55,13 @@ def test_add_up_adds_in_the_order_of_the_rows(rows: np.ndarray) -> None:
     assert add_up(rows).tobytes() == total.tobytes()
 
 
-@given(st.integers(0, 7_000).map(lambda sevenths: sevenths / 7) | st.floats(0.0, 1e3) | st.floats(0.0, 1e-12))
-def test_the_log_of_one_and_something_is_within_three_ulp(x: float) -> None:
+@given(st.integers(0, 7_000).map(lambda sevenths: sevenths / -7) | st.floats(-1e3, 0.0) | st.floats(-1e-12, 0.0))
+def test_the_loss_of_the_likeliest_class_is_within_five_ulp_however_small(score: float) -> None:
+    loss = softmax_and_losses(np.array([[0.0], [score]]), np.array([0]))[1][0]
     with precisely():
-        truth = mpmath.log1p(exact(x))
-    # The logarithm's two, and the correction's quotient, product and sum.
-    assert ulps(float(_log_of_one_and(np.array([x]))[0]), truth) <= 3.0
+        truth = mpmath.log1p(mpmath.exp(exact(score)))
+    # The odds' one, the logarithm's two, and the correction's quotient and sum. Below 2^-1022 numbers are coarser.
+    assert ulps(float(loss), truth) <= 5.0
 
 
 SIXTY_FOURTHS = np.arange(-45_000, 45_000) / 64.0  # exact
