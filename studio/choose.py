@@ -20,10 +20,8 @@ from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
 from thenar.compiler.glove.prices import Part
 from thenar.compiler.hand import HandShape, moved_by
 from thenar.compiler.placement.constraints import Limits
-from thenar.compiler.placement.elements import elements_of, names_of
 from thenar.compiler.recordings.edits import TrialId
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.samples import Samples
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.hand import DrawnJoint, DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
@@ -45,7 +43,6 @@ class Recordings:
     numbering  what pages call this numbering
     hand       the glove laid flat, if it has the positions of the sensors
     parts      the part for each sensor, by its name; empty without a price list
-    levels     the element that a switch or a pad is read as, by its name: itself, or a level
     """
 
     grasp_set: GraspSet
@@ -54,7 +51,6 @@ class Recordings:
     numbering: str
     hand: HandShape | None
     parts: dict[str, Part]
-    levels: dict[str, str]
 
     @property
     def files(self) -> list[str]:
@@ -101,7 +97,7 @@ class ChoosePage:
         of_rows = [trial for trial, none in zip(rows, grasp_set.is_none.tolist(), strict=True) if not none]
         ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
         numbering = hashlib.sha256(msgspec.json.encode((ids, grasp_set.fingerprint()))).hexdigest()[:12]
-        now = Recordings(grasp_set, quick, ids, numbering, hand, parts, _levels(grasp_set))
+        now = Recordings(grasp_set, quick, ids, numbering, hand, parts)
         self._recordings = now
         kinds = ["switch"] * len(grasp_set.switch_names) + ["pad"] * len(grasp_set.taxel_columns)
         kinds += ["joint"] * len(grasp_set.joints)
@@ -150,12 +146,13 @@ class ChoosePage:
     def _reply(self, sensors: Sequence[int]) -> bytes:
         now = self.recordings
         names, found = now.names(sensors), now.quick.of(sensors)
+        pads = [f"{name}>1" for name in now.grasp_set.taxel_names if name in names]  # read alike at any level
         return message(
             "quick",
             found,
             sensors=sensors,
             weakest=_weakest(now.quick, found),
-            scan_us=scan_time_us([now.levels[name] for name in names if name in now.levels]),
+            scan_us=scan_time_us([name for name in names if name in now.grasp_set.switch_names] + pads),
             price=sum(now.prices[name] for name in names) if now.parts else None,
             commands=self._commands(now.files, names),
         )
@@ -203,13 +200,6 @@ def _weakest(quick: QuickAccuracy, found: Quick) -> str:
     truth, read = worst = max(sorted(pairs), key=lambda pair: pairs[pair])
     total = np.count_nonzero(quick.truth == truth)
     return f"{quick.grasps[truth]} recognised as {quick.grasps[read]}: {pairs[worst]} of {total} trials"
-
-
-def _levels(grasp_set: GraspSet) -> dict[str, str]:
-    held = grasp_set.without_none()
-    elements = elements_of(Samples.of(held), 1)
-    every = grasp_set.element_names
-    return {every[one.column]: name for one, name in zip(elements, names_of(held, elements), strict=True)}
 
 
 def _content(study: SensorStudy, names: Sequence[str]) -> dict[str, object]:

@@ -5,8 +5,7 @@ import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
 import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 
-// Up: only b, down: only a; shapes differ as well as colours.
-const SIGNS = { both: "M0-4L4 0L0 4L-4 0Z", a: "M-4-3H4L0 4Z", b: "M-4 3H4L0-4Z" };
+const SIGNS = { both: "ab", a: "a", b: "b" };
 
 const ask = openPage({
   open: () => commands(),
@@ -87,24 +86,20 @@ function linked({ trial, subject, object, recorded }) {
   return make("a", { href: `errors.html#${encodeURIComponent(`${words}: ${recorded}`)}` }, words);
 }
 
-const sign = (kind, size) => draw("path", { class: `sign ${kind}`, d: SIGNS[kind], transform: `scale(${size})` });
-
-/** Draw one hand on which a sign says which build reads a sensor, and list all sensors by their signs. */
+/** Draw one hand on which letters say which build reads a sensor, and list all sensors by their builds. */
 function overlay(hand, kept, builds) {
   const kinds = new Map(Object.entries(kept).flatMap(([kind, names]) => names.map((name) => [name, kind])));
   $("hand").toggleAttribute("hidden", !hand.switches.length);
   drawHand($("hand"), { ...hand, switches: hand.switches.map(({ bit, ...one }) => (kinds.has(one.name) ? { ...one, bit } : one)) });
   for (const spot of $("hand").querySelectorAll(".spot")) {
     const kind = kinds.get(spot.querySelector("title").textContent);
-    if (kind) spot.append(sign(kind, hand.radius_mm / 2));
+    if (kind) spot.append(draw("text", { class: `sign ${kind} middle` }, SIGNS[kind]));
   }
   $("hand").setAttribute("aria-label", "The hand with the sensors of both builds, which the list names");
   const titles = { both: "both", a: `only a (${builds[0].name})`, b: `only b (${builds[1].name})` };
-  const entries = Object.entries(kept).map(([kind, names]) => {
-    const picture = draw("svg", { viewBox: "-5 -5 10 10", "aria-hidden": "true" }, sign(kind, 1));
-    return make("li", {}, picture, `${titles[kind]}: ${names.length ? `${names.length}, ${names.join(", ")}` : "none"}`);
-  });
-  $("legend").replaceChildren(...entries);
+  list($("legend"), Object.entries(kept).map(([kind, names]) => {
+    return `${titles[kind]}: ${names.length ? `${names.length}, ${names.join(", ")}` : "none"}`;
+  }));
 }
 
 /** What was compared before is another matter. */
