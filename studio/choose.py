@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -177,17 +176,17 @@ class ChoosePage:
         if now.names(asked.sensors) != names:
             raise ThenarError("the recordings have other sensors now: choose again")
         recipe = Recipe() if asked.do == "curve" else Recipe(sensors=len(names), have=names)
-        many: dict[str, Any] = {"jobs": self._studio.jobs}
+        jobs = self._studio.jobs
         if asked.do == "train":
             output = self._project.new_path(_BUILD)
             documents = Documents(now.hand, parts=now.parts)
-            built = compile_build(now.grasp_set, output, recipe, documents=documents, progress=report, **many)
+            built = compile_build(now.grasp_set, output, recipe, documents=documents, progress=report, jobs=jobs)
             content: dict[str, object] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
             self._project.remember(build=output.name)
             self._studio.changed()
         else:
             limits = Limits.of(recipe, now.grasp_set, {}, prices=now.prices)
-            study = study_sensors(now.grasp_set, recipe, limits=limits, report=report, **many)
+            study = study_sensors(now.grasp_set, recipe, limits=limits, jobs=jobs, report=report)
             content = _content(study, now.quick.names)
         return content | {"sensors": asked.sensors, "numbering": now.numbering}
 

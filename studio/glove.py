@@ -3,6 +3,7 @@
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -122,13 +123,6 @@ class GlovePage:
         self._studio.station.start("watching", self._watch)
 
     def _watch(self, stop: Event) -> None:
-        try:
-            self._show(stop)
-        finally:
-            # A page that is opened later shows nothing old.
-            self._studio.publish("glove-state", states=())
-
-    def _show(self, stop: Event) -> None:
         """Show the state of every sensor, until `stop` is set."""
         sensors = self._sensors()
         harness, kinds = self._project.wiring(), sensors.kinds
@@ -138,7 +132,10 @@ class GlovePage:
         moved = dict.fromkeys(_LEAST_CHANGE, 0)
         came, rates = {"switches and pads": 0, "joints": 0}, dict[str, float]()
         shown_s = rated_s = monotonic()
-        with Sources(harness, harness.switches, whole_scan(harness, harness.switches, every_taxel=True)) as sources:
+        scan = whole_scan(harness, harness.switches, every_taxel=True)
+        with ExitStack() as ending, Sources(harness, harness.switches, scan) as sources:
+            # A page that is opened later shows nothing old.
+            ending.callback(self._studio.publish, "glove-state", states=())
             while not stop.is_set():
                 snapshot = sources.take(WAIT_US)
                 sources.raise_settings()

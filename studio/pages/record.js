@@ -1,5 +1,5 @@
 // The page Record: a collection is begun, led key by key, and ends with a set.
-import { percent, showKeys, showLastEdit, trained } from "./choice.js";
+import { interval, showKeys, showLastEdit, trained } from "./choice.js";
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
@@ -178,8 +178,7 @@ function markTrials() {
 function accuracyWords(accuracy) {
   if (!accuracy) return "An accuracy is shown from two trials of every type on.";
   if (accuracy.why) return `No accuracy: ${accuracy.why}`;
-  const { mean, low, high, of } = accuracy;
-  return `All sensors tell these trials apart in ${percent(mean)} % [${percent(low)}, ${percent(high)}], ${of}; quick: not nested`;
+  return `All sensors tell these trials apart in ${interval(accuracy)}, ${accuracy.of}; quick: not nested`;
 }
 
 $("repetitions").value = query.get("repetitions") ?? $("repetitions").value;
