@@ -1,5 +1,5 @@
 // What pages of the studio share: the sensors that are in use, boxes, keys, and what was trained.
-import { $, box, button, make, say } from "./wire.js";
+import { $, box, button, list, make, say, tell } from "./wire.js";
 
 // The sensors are those of all pages in this tab; a reload and a restart of the server keep them.
 const KEY = "thenar.sensors";
@@ -68,7 +68,6 @@ export function showLastEdit(words) {
 
 /** Show what was trained. */
 export function trained({ folder, facts }) {
-  const items = facts.map((fact) => make("li", {}, fact));
-  const heading = make("h3", { id: "build-heading" }, `Trained: ${folder}`);
-  $("build").replaceChildren(heading, make("ul", { id: "facts", "aria-labelledby": "build-heading" }, ...items));
+  tell("build-heading", `Trained: ${folder}`);
+  list($("facts"), facts);
 }
