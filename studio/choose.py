@@ -75,8 +75,6 @@ class ChoosePage:
         self._recordings: Recordings | None = None
         requests: dict[str, Handler] = {
             "choose": lambda asked: self._reply(asked.sensors),
-            "add": lambda asked: self._found("add", asked.sensors),
-            "drop": lambda asked: self._found("drop", asked.sensors),
             "use": self._use,
             **dict.fromkeys(("measure", "curve", "train"), self._job),
         }
@@ -124,11 +122,6 @@ class ChoosePage:
         if self._recordings is None:
             raise ThenarError("the recordings are not read yet")
         return self._recordings
-
-    def _found(self, do: str, sensors: tuple[int, ...]) -> bytes:
-        quick = self.recordings.quick
-        find = quick.best_next if do == "add" else quick.least
-        return message(do, sensor=find(sensors), sensors=sensors)
 
     def _use(self, asked: Asked) -> None:
         """Use a set, or leave it aside. Raises SettingError if there is no such set."""

@@ -69,11 +69,11 @@ def choose_page(folder: Path) -> Iterator[str]:
 
 
 def choose_sensors(driver: webdriver.Chrome, wait: WebDriverWait[webdriver.Chrome]) -> None:
-    """Let the page add the best sensor six times."""
+    """Choose six sensors."""
     for number in range(7):
         wait.until(lambda _, number=number: driver.find_element("id", "count").text.startswith(f"{number} of "))
         if number < 6:
-            driver.find_element("id", "add").click()
+            driver.find_elements("css selector", "#list input")[8 * number].click()
 
 
 def main() -> None:

@@ -40,13 +40,8 @@ const ask = openPage({
     choose(storedChoice(set.sensors));
   },
   quick: (reply) => {
-    if (isChosen(reply.sensors)) show(reply);
-  },
-  add: ({ sensor, sensors }) => {
-    if (sensor !== null && isChosen(sensors)) choose([...chosen, sensor]);
-  },
-  drop: ({ sensor, sensors }) => {
-    if (sensor !== null && isChosen(sensors)) choose(chosen.filter((one) => one !== sensor));
+    // A reply to an earlier choice comes too late.
+    if (String(reply.sensors) === String(chosen)) show(reply);
   },
   measure: ({ sensors, points, of, recipe, numbering }) => {
     if (numbering !== set.numbering) return;
@@ -57,8 +52,6 @@ const ask = openPage({
   train: trained,
 });
 
-// A reply to an earlier choice comes too late.
-const isChosen = (sensors) => String(sensors) === String(chosen);
 const key = (sensors) => [...sensors].sort((a, b) => a - b).join(",");
 
 function toggle(sensor) {
@@ -181,6 +174,6 @@ function detail(point, of) {
   $("point-choose").onclick = () => choose(point.sensors);
 }
 
-for (const what of ["add", "drop", "measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));
+for (const what of ["measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));
 $("curve").addEventListener("click", () => ask("curve"));
 $("clear").addEventListener("click", () => choose([]));
