@@ -15,7 +15,7 @@ import numpy as np
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
-from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
+from thenar.compiler.artifact.sensor_study import study_sensors
 from thenar.compiler.glove.prices import Part
 from thenar.compiler.hand import HandShape, moved_by
 from thenar.compiler.placement.constraints import Limits
@@ -180,7 +180,7 @@ class ChoosePage:
         else:
             limits = Limits.of(recipe, now.grasp_set, {}, prices=now.prices)
             study = study_sensors(now.grasp_set, recipe, limits=limits, jobs=jobs, report=report)
-            content = _content(study, now.quick.names)
+            content = {**msgspec.to_builtins(study), "recipe": str(study.recipe)}
         return content | {"sensors": asked.sensors, "numbering": now.numbering}
 
 
@@ -192,24 +192,6 @@ def _weakest(quick: QuickAccuracy, found: Quick) -> str:
     truth, read = worst = max(sorted(pairs), key=lambda pair: pairs[pair])
     total = np.count_nonzero(quick.truth == truth)
     return f"{quick.grasps[truth]} recognised as {quick.grasps[read]}: {pairs[worst]} of {total} trials"
-
-
-def _content(study: SensorStudy, names: Sequence[str]) -> dict[str, object]:
-    """Return the fields of a study that pages show: sensors are numbered in the order of `names`."""
-    numbers = {name: number for number, name in enumerate(names)}
-    return {
-        "of": study.of,
-        "enough": study.enough,
-        "recipe": str(study.recipe),
-        "points": [
-            {
-                "sensors": [numbers[name] for name in point.sensors],
-                **{name: getattr(point, name) for name in ("mean", "low", "high", "adapted", "papers")},
-                "worth": "" if point.worth is None else str(point.worth),
-            }
-            for point in study.points
-        ],
-    }
 
 
 def _joints(held: GraspSet) -> list[DrawnJoint]:

@@ -24,6 +24,11 @@ export function percent(share) {
   return (100 * share).toFixed(1);
 }
 
+/** Return a difference of shares in points, with its sign. */
+export function points(share) {
+  return `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
+}
+
 /** Return the time of a scan of sensors, in words. */
 export function scanTime(us) {
   if (us === null) return "unknown: they are more than the chips of one bus read";

@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { listBoxes, percent, scanTime, ticked } from "./choice.js";
+import { listBoxes, percent, points, scanTime, ticked } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -50,8 +50,6 @@ function exported({ said, address, name }) {
   say(link, `Save ${name}`);
   commands();
 }
-
-const points = (share) => `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
 
 function show({ builds, hand, both, only, found, said, unused }) {
   $("result").hidden = false;
