@@ -45,9 +45,6 @@ export function listBoxes(element, members, changed) {
   if (labels.length !== before.size || labels.some((label, at) => label !== element.children[at])) element.replaceChildren(...labels);
 }
 
-/** Return the ids of the members whose boxes are ticked. */
-export const ticked = (element) => [...element.querySelectorAll(":checked")].map(({ value }) => value);
-
 /**
  * Show the keys that count now as buttons, the usual one first, with their letters if they have some.
  * @returns {?HTMLButtonElement} the first one, or null if the keys are those of before

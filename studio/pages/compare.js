@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { listBoxes, percent, points, scanTime, ticked } from "./choice.js";
+import { listBoxes, percent, points, scanTime } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -34,7 +34,7 @@ const ask = openPage({
   firmware: (made) => exported(made),
 });
 
-const request = () => [$("a").value, $("b").value, ...ticked($("sets"))];
+const request = () => [$("a"), $("b"), ...$("sets").querySelectorAll(":checked")].map(({ value }) => value);
 
 /** Ask for the commands that do what the buttons do. */
 function commands() {
