@@ -89,7 +89,7 @@ class ChoosePage:
             quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
             self._recordings = None
-            self._studio.publish("set", why=str(reason), sensors=(), grasps=(), trials=(), name="")
+            self._studio.publish("set", why=str(reason), sensors=(), trials=(), name="")
             return
         of_rows = [trial for trial, none in zip(rows, grasp_set.is_none.tolist(), strict=True) if not none]
         ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
@@ -102,7 +102,6 @@ class ChoosePage:
             "why": "",
             "name": ", ".join(now.files),
             "unused": unused,
-            "grasps": quick.grasps,
             "types": quick.held.taxonomy.types,
             "taxonomy": grasp_set.taxonomy.name,
             "hand": drawn(grasp_set, hand),

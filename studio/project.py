@@ -36,7 +36,6 @@ class Member(msgspec.Struct, frozen=True):
     """A file or folder of a project, which pages name by its id."""
 
     id: str
-    kind: str
     name: str
 
 
@@ -102,7 +101,7 @@ class Project:
         found = sorted(path for path in self.folder.glob(_KINDS[kind]) if path.exists())
         names = [path.parent.name if kind == "build" else path.name for path in found]
         # A name that is no text cannot be sent to a page.
-        return [Member(_id(name), kind, name) for name in names if name == name.encode(errors="ignore").decode()]
+        return [Member(_id(name), name) for name in names if name == name.encode(errors="ignore").decode()]
 
     def path(self, kind: str, member: str) -> Path:
         """Return the path of a member. Raises SettingError if there is none of this id."""

@@ -62,6 +62,14 @@ export function showKeys(keys, ask, letters = {}) {
   return buttons[0] ?? null;
 }
 
+/** Let a form do this when it is sent, instead of loading another page. */
+export function onSubmit(id, act) {
+  $(id).addEventListener("submit", (event) => {
+    event.preventDefault();
+    act();
+  });
+}
+
 /** Show the last edit of trials, which can be undone. */
 export function showLastEdit(words) {
   $("undo").disabled = !words;

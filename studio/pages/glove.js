@@ -1,6 +1,6 @@
 // The page Glove: a glove is connected, watched and calibrated.
 import { draw, drawHand } from "./hand.js";
-import { showKeys } from "./choice.js";
+import { onSubmit, showKeys } from "./choice.js";
 import { openPage } from "./shell.js";
 import { $, button, clock, fillTable, list, make, say } from "./wire.js";
 
@@ -176,10 +176,7 @@ function showStep({ step, what, problems, faults, keys }) {
   showKeys(keys, ask)?.focus();
 }
 
-$("form").addEventListener("submit", (event) => {
-  event.preventDefault();
-  ask("find", { name: $("address").value.trim() });
-});
+onSubmit("form", () => ask("find", { name: $("address").value.trim() }));
 $("connect").addEventListener("click", () => {
   begun = false;
   ask("connect");

@@ -1,5 +1,5 @@
 // The page Record: a collection is begun, led key by key, and ends with a set.
-import { interval, showKeys, showLastEdit, trained } from "./choice.js";
+import { interval, onSubmit, showKeys, showLastEdit, trained } from "./choice.js";
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
@@ -187,8 +187,7 @@ say($("only"), `Only of ${only.join(" and ")}.`);
 if (only.length) $("none").checked = false;
 $("subject").addEventListener("input", () => (edited = true));
 $("taxonomy").addEventListener("change", askTypes);
-$("form").addEventListener("submit", (event) => {
-  event.preventDefault();
+onSubmit("form", () => {
   ask("record", {
     name: $("subject").value.trim(),
     id: $("taxonomy").value,
@@ -198,10 +197,7 @@ $("form").addEventListener("submit", (event) => {
     ids: only,
   });
 });
-$("relabel").addEventListener("submit", (event) => {
-  event.preventDefault();
-  ask("relabel", { trial: seen, name: $("type").value });
-});
+onSubmit("relabel", () => ask("relabel", { trial: seen, name: $("type").value }));
 $("drop").addEventListener("click", () => ask("relabel", { trial: seen, name: "" }));
 $("undo").addEventListener("click", () => ask("undo"));
 // After a click of the mouse, Enter is the key of the recording again.

@@ -1,4 +1,5 @@
 // The page Wearer: a few trials of a person, a build that is adapted to them, and the way back.
+import { onSubmit } from "./choice.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
 import { $, fillTable, list, say, tell } from "./wire.js";
@@ -53,12 +54,8 @@ function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt
   say($("adapt-command"), adapt);
 }
 
-$("who").addEventListener("submit", (event) => {
-  event.preventDefault();
-  ask("wearer", { name: $("subject").value });
-});
-$("record").addEventListener("submit", (event) => {
-  event.preventDefault();
+onSubmit("who", () => ask("wearer", { name: $("subject").value }));
+onSubmit("record", () => {
   begun = ask("wear", { name: $("type").value });
 });
 $("adapt").addEventListener("click", () => {
