@@ -251,11 +251,6 @@ $("relabel").addEventListener("click", () => edit($("type").value));
 $("drop").addEventListener("click", () => edit(""));
 $("undo").addEventListener("click", () => ask("undo"));
 $("show-more").addEventListener("click", () => askFor($("trials").querySelectorAll("article").length));
-$("lasso").addEventListener("click", () => {
-  const on = $("lasso").getAttribute("aria-pressed") !== "true";
-  $("lasso").setAttribute("aria-pressed", String(on));
-  map.touch = on;
-});
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select, input:not([type=checkbox])")) return;
   if (event.key === "n" || event.key === "p") nextError(event.key === "n" ? 1 : -1);

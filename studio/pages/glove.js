@@ -166,7 +166,7 @@ $("problem").addEventListener("click", () => {
 
 function showStep({ step, what, problems, faults, keys }) {
   const open = Boolean(step);
-  if (open === $("calibration").hidden) $("refused").textContent = open ? "" : $("refused").textContent;
+  if (open && $("calibration").hidden) say($("refused"), "");
   $("calibration").hidden = !open;
   if (!open) return;
   say($("step"), step);

@@ -11,7 +11,6 @@ export class TrialMap {
   #pointed = -1;
   #line = null; // the lasso while it is drawn
   #lasso = draw("polyline", { transform: `translate(-${MARGIN} -${MARGIN})` });
-  #touch = false;
   #closed = false; // whether the click to come ends a lasso
 
   /** on: { point(trial or -1), select(trials) } */
@@ -19,7 +18,7 @@ export class TrialMap {
     [this.#svg, this.#on] = [svg, on];
     const at = (event) => [event.offsetX, event.offsetY];
     svg.addEventListener("pointerdown", (event) => {
-      if (event.button || (event.pointerType === "touch" && !this.#touch)) return;
+      if (event.button) return;
       svg.setPointerCapture(event.pointerId);
       this.#line = [at(event)];
     });
@@ -30,6 +29,7 @@ export class TrialMap {
       } else this.#point(this.#nearest(at(event)));
     });
     svg.addEventListener("pointerup", () => this.#close());
+    // A finger that moves up or down scrolls the page.
     svg.addEventListener("pointercancel", () => this.#drop());
     svg.addEventListener("click", (event) => {
       const trial = this.#nearest(at(event));
@@ -37,12 +37,6 @@ export class TrialMap {
       this.#closed = false;
     });
     svg.addEventListener("keydown", (event) => this.#press(event));
-  }
-
-  /** Let a finger draw the lasso instead of scrolling. */
-  set touch(on) {
-    this.#touch = on;
-    this.#svg.classList.toggle("lasso", on);
   }
 
   /** places: [x, y] of each trial, 0 to 1; looks: { colour, wrong } of each; codes: of each type { code, trials } */
