@@ -58,7 +58,7 @@ class GlovePage:
         self._proposal = ""
         self._past: Sequence[deque[tuple[float, int | None]]] = ()
         requests: Mapping[str, Callable[[Asked], bytes | None]] = {
-            "watch": self._on_watch,
+            "watch": lambda _: studio.station.start("watching", self._watch),
             "find": self._on_find,
             "connect": self._on_connect,
             "past": self._on_past,
@@ -118,9 +118,6 @@ class GlovePage:
             raise SettingError("no glove was found yet: press Find first")
         write_atomically(self._project.harness, self._proposal.encode())
         self._studio.changed()
-
-    def _on_watch(self, _asked: Asked) -> None:
-        self._studio.station.start("watching", self._watch)
 
     def _watch(self, stop: Event) -> None:
         """Show the state of every sensor, until `stop` is set."""
