@@ -55,7 +55,7 @@ export function showKeys(keys, ask, letters = {}) {
   $("keys").dataset.keys = said;
   const buttons = words.map(([key, what], at) => {
     const made = button(what, () => ask("key", { name: key }), { class: at ? "plain" : "", "data-key": key });
-    if (letters[key]) made.append(make("kbd", {}, letters[key]));
+    if (letters[key]) made.append(" ", make("kbd", {}, letters[key]));
     return made;
   });
   $("keys").replaceChildren(...buttons);

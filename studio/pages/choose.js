@@ -43,9 +43,9 @@ const ask = openPage({
     // A reply to an earlier choice comes too late.
     if (String(reply.sensors) === String(chosen)) show(reply);
   },
-  measure: ({ sensors, points, of, recipe, numbering }) => {
+  measure: ({ sensors, points: [point], of, recipe, numbering }) => {
     if (numbering !== set.numbering) return;
-    measured.set(key(sensors), { ...points[0], of, recipe });
+    measured.set(key(sensors), { ...point, of, recipe });
     certify();
   },
   curve: (curve) => curve.numbering === set.numbering && drawCurve(curve),

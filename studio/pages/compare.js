@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { listBoxes, percent, points, scanTime } from "./choice.js";
+import { interval, listBoxes, percent, points, scanTime } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -56,7 +56,7 @@ function show({ builds, hand, both, only, found, said, unused }) {
   say($("said"), said);
   list($("unused"), unused);
   const rows = [
-    ["Recognised of these trials", ({ right, ends }) => `${percent(right / found.trials)} % [${ends.map(percent).join(", ")}]`],
+    ["Recognised of these trials", ({ right, ends: [low, high] }) => interval({ mean: right / found.trials, low, high })],
     ["Sensors", (build) => build.sensors],
     ["Scan of switches and pads", (build) => scanTime(build.scan_us)],
     ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
