@@ -159,8 +159,8 @@ function drawFront(found, of) {
       "g",
       { class: "point" },
       draw("path", { d: `M${x(number)} ${y(point.low)}V${y(point.high)}` }),
-      draw("circle", { cx: x(number), cy: y(point.mean), r: 5 }),
-      draw("rect", { x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
+      draw("circle", { class: "open", cx: x(number), cy: y(point.mean), r: 5 }),
+      draw("rect", { class: "area", x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
     );
     svg.append(pressable(spot, `${number} sensors: ${interval(point)}`, () => detail(point, of)));
   }

@@ -43,11 +43,7 @@ function commands() {
 
 function exported({ said, address, name }) {
   say($("exported"), said);
-  $("download").hidden = false;
-  const link = $("download").firstChild;
-  link.href = address;
-  link.download = name;
-  say(link, `Save ${name}`);
+  $("download").replaceChildren(make("a", { href: address, download: name }, `Save ${name}`));
   commands();
 }
 

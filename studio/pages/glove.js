@@ -110,8 +110,6 @@ function showState(message) {
     connected ? error || "connected" : `lost: ${error}`,
     counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
   ]);
-  if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
-  $("devices-table").dataset.rows = JSON.stringify(rows);
   fillTable("devices", ["Device", "State", "Counted"], rows);
 }
 

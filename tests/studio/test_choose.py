@@ -339,6 +339,7 @@ def test_a_point_of_the_front_says_what_it_is_and_is_chosen(browser: Browser, st
     points[3].send_keys(Keys.ENTER)
     browser.wait(lambda: browser.text("point-heading").startswith("4 sensors: "))
     assert points[3].get_attribute("aria-pressed") == "true"
+    browser.picture("front")
     assert browser.texts("#points td:nth-of-type(2)")[3] in browser.text("point-about")
     names = browser.text("point-sensors").split(", ")
     browser.driver.find_element(By.ID, "point-choose").send_keys(Keys.ENTER)
