@@ -72,7 +72,7 @@ class GlovePage:
         content: dict[str, object] = {"hand": None, "names": (), "kinds": ()}
         if there:
             try:
-                sensors = self._sensors()
+                sensors = GloveSensors(self._project)
                 lacks = sensors.lacks
                 content = {"hand": sensors.drawing, "names": sensors.names, "kinds": sensors.kinds}
             except (ThenarError, OSError) as reason:
@@ -84,9 +84,6 @@ class GlovePage:
             "pad": self._project.command([*words, "--taxels", "-o", self._project.folder / _PADS_FILE]),
         }
         self._studio.publish("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports, commands=commands)
-
-    def _sensors(self) -> GloveSensors:
-        return GloveSensors(self._project.wiring(), self._project.hand())
 
     def _on_find(self, asked: Asked) -> None:
         """Listen at an address, and propose a glove.toml."""
@@ -121,7 +118,7 @@ class GlovePage:
 
     def _watch(self, stop: Event) -> None:
         """Show the state of every sensor, until `stop` is set."""
-        sensors = self._sensors()
+        sensors = GloveSensors(self._project)
         harness, kinds = self._project.wiring(), sensors.kinds
         past = self._past = [deque[tuple[float, int | None]](maxlen=_MOST_KEPT) for _ in kinds]
         last: list[int | None] = [None] * len(kinds)

@@ -233,7 +233,7 @@ class Sitting:
         self.output, self._adapts = recording.with_suffix(".grasps"), bool(collection.build)
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
-        self._sensors = GloveSensors(self._project.wiring(), self._project.hand())
+        self._sensors = GloveSensors(self._project)
         # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
         # step and the time.
         self._captured = dict[int, Frames]()

@@ -10,7 +10,7 @@ from thenar.runtime.calibration import load_calibration, numbers_of
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.hand import DrawnJoint, DrawnSwitch, DrawnTaxel, HandDrawing
-from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.timing import scan_us
@@ -24,10 +24,8 @@ class GloveSensors:
 
     Parameters
     ----------
-    harness : Harness
-        The glove.
-    hand : HandShape
-        On which switches and taxels are drawn, if it knows all of them.
+    project : Project
+        The project, on whose hand switches and taxels are drawn, if it knows all of them.
 
     Attributes
     ----------
@@ -40,11 +38,12 @@ class GloveSensors:
 
     Raises
     ------
-    ThenarError
-        If a calibration cannot be read.
+    ThenarError, OSError
+        If the glove's files cannot be read.
     """
 
-    def __init__(self, harness: Harness, hand: HandShape) -> None:
+    def __init__(self, project: Project) -> None:
+        harness = project.wiring()
         switches, taxels, joints = harness.switches, harness.taxel_names, harness.sensor_names
         self.names = (*switches, *taxels, *joints)
         self.kinds = ("switch",) * len(switches) + ("pad",) * len(taxels) + ("joint",) * len(joints)
@@ -57,7 +56,7 @@ class GloveSensors:
         # The numbers of the first taxel and of the first joint.
         self._pad, self._joint = len(switches), len(self.names) - len(joints)
         self.lacks = ("joint",) * (bool(joints) and path is None) + ("pad",) * (None in self._pads)
-        places, fields = placed((*switches, *taxels), hand)
+        places, fields = placed((*switches, *taxels), project.hand())
         angles = {line.name for line in calibrated}
         self.drawing = HandDrawing(
             **fields,

@@ -136,7 +136,7 @@ function drawCurve({ points: found, of, enough }) {
   detail(found.find(({ number }) => number === enough), of);
 }
 
-const BOX = { left: 46, right: 470, top: 10, bottom: 262 };
+const BOX = { left: 52, right: 470, top: 10, bottom: 262 };
 
 function drawFront(found, of) {
   const svg = $("front"), most = Math.max(...found.map(({ number }) => number));

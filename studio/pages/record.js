@@ -4,7 +4,7 @@ import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { $, button, fillMenu, list, make, say } from "./wire.js";
+import { $, button, fillMenu, list, make, say, tell } from "./wire.js";
 
 const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
 
@@ -182,8 +182,7 @@ function accuracyWords(accuracy) {
 }
 
 $("repetitions").value = query.get("repetitions") ?? $("repetitions").value;
-$("only").hidden = !only.length;
-say($("only"), `Only of ${only.join(" and ")}.`);
+tell("only", only.length && `Only of ${only.join(" and ")}.`);
 if (only.length) $("none").checked = false;
 $("subject").addEventListener("input", () => (edited = true));
 $("taxonomy").addEventListener("change", askTypes);
