@@ -68,13 +68,13 @@ class GlovePage:
 
     def read(self, report: Report) -> None:
         """Show the glove of the project, or what one can be connected to."""
-        there, why, lacks = self._project.harness.exists(), "", tuple[str, ...]()
-        content: dict[str, object] = {"hand": None, "names": (), "kinds": ()}
+        there, why = self._project.harness.exists(), ""
+        content: dict[str, object] = {"hand": None, "names": (), "kinds": (), "lacks": ()}
         if there:
             try:
                 sensors = GloveSensors(self._project)
-                lacks = sensors.lacks
-                content = {"hand": sensors.drawing, "names": sensors.names, "kinds": sensors.kinds}
+                content = {"hand": sensors.drawing, "names": sensors.names}
+                content |= {"kinds": sensors.kinds, "lacks": sensors.lacks}
             except (ThenarError, OSError) as reason:
                 why = str(reason)
         ports = sorted(str(port) for pattern in _PORTS for port in Path("/dev").glob(pattern))
@@ -83,7 +83,7 @@ class GlovePage:
             "joint": self._project.command([*words, "-o", self._project.folder / _JOINTS_FILE]),
             "pad": self._project.command([*words, "--taxels", "-o", self._project.folder / _PADS_FILE]),
         }
-        self._studio.publish("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports, commands=commands)
+        self._studio.publish("glove-hand", content, there=there, why=why, ports=ports, commands=commands)
 
     def _on_find(self, asked: Asked) -> None:
         """Listen at an address, and propose a glove.toml."""

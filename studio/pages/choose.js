@@ -14,7 +14,6 @@ let shown = null; // the last reply
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
-  open: () => set && !set.why && choose(chosen),
   project: ({ sets, state: { aside, took } }) => {
     listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name })), ({ target }) => {
       ask("use", { id: target.value, value: Number(target.checked) });

@@ -8,7 +8,6 @@ import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 const SIGNS = { both: "ab", a: "a", b: "b" };
 
 const ask = openPage({
-  open: () => commands(),
   project: ({ builds, sets, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);

@@ -24,7 +24,6 @@ const map = new TrialMap($("map"), {
 });
 
 const ask = openPage({
-  open: () => set && !set.why && look(),
   set: (message) => {
     if (set && set.numbering === message.numbering && set.why === message.why) return;
     // Where a trial was left out, the next one has its number.
