@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { interval, listBoxes, percent, points, scanTime } from "./choice.js";
+import { interval, listBoxes, points, scanTime } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
