@@ -111,7 +111,7 @@ function certify() {
 
 /* ---- The curve: what sensors are worth, as a table and as a front of points to click on ---- */
 
-/** Return what the last sensor of a point is worth, in words. */
+/** Return the worth of the last sensor of a point, in words. */
 const worth = ({ worth: gain }) => gain && `${points(gain.mean)} [${percent(gain.low)}, ${percent(gain.high)}]`;
 
 /** Choose the sensors with these names. */
