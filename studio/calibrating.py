@@ -101,7 +101,10 @@ def lead_presses(
 
     Raises DeviceError if no device sends taxels, SettingError if there are none.
     """
-    with _sources(glove, taxels=True) as (harness, sources):
+    harness = _uncalibrated(glove)
+    if not harness.taxel_names:
+        raise SettingError(f"{glove.name} names no taxels: add `taxels` to a [[stream]], or add a converter")
+    with Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources:
         codes, rested, names = list[Codes](), list[Codes](), harness.taxel_names
         nothing: Codes = (None,) * len(names)
 
@@ -133,22 +136,9 @@ def lead_presses(
         return names, TaxelCalibration(subject=subject, unit="press" if newtons is None else "N", taxels=lines)
 
 
-@contextmanager
-def _sources(glove: Path, *, taxels: bool) -> Iterator[tuple[Harness, Sources]]:
-    """Yield the harness that is calibrated, and its open devices: those with taxels, or the device with joints.
-
-    Raises SettingError if there are none.
-    """
-    harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file to be written
-    if taxels and not harness.taxel_names:
-        raise SettingError(f"{glove.name} names no taxels: add `taxels` to a [[stream]], or add a converter")
-    if not taxels:
-        device = harness.joint_device
-        if not isinstance(device, StreamWiring):
-            raise SettingError(f"{glove.name} has no joints: add a [cyberglove], or `joints` to a [[stream]]")
-        harness = replace(harness, buses=(), spi=(), streams=(device,))
-    with Sources(harness, (), whole_scan(harness, (), every_taxel=taxels)) as sources:
-        yield harness, sources
+def _uncalibrated(glove: Path) -> Harness:
+    """Return the harness in a file, without the calibration of its taxels: it may be the file to be written."""
+    return replace(load_harness(glove), taxel_settings=TaxelSettings())
 
 
 def _await(sources: Sources, read: Callable[[], Any], what: str) -> None:
@@ -172,9 +162,14 @@ def _rows(
     """
     names = tuple[str, ...]()
     if port.endswith(".toml"):
-        wired = load_harness(port).cyberglove
+        harness = _uncalibrated(Path(port))
+        wired, device = harness.cyberglove, harness.joint_device
         if wired is None:
-            with _sources(Path(port), taxels=False) as (harness, sources):
+            if not isinstance(device, StreamWiring):
+                name = Path(port).name
+                raise SettingError(f"{name} has no joints: add a [cyberglove], or `joints` to a [[stream]]")
+            harness = replace(harness, buses=(), spi=(), streams=(device,))
+            with Sources(harness, (), whole_scan(harness, ())) as sources:
 
                 def newest() -> bytes | None:
                     """Return the newest row that measures every joint."""

@@ -9,21 +9,18 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import msgspec
 import numpy as np
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
-from thenar.compiler.artifact.sensor_study import SensorStudy, study_sensors
+from thenar.compiler.artifact.sensor_study import study_sensors
 from thenar.compiler.glove.prices import Part
 from thenar.compiler.hand import HandShape, moved_by
 from thenar.compiler.placement.constraints import Limits
-from thenar.compiler.placement.elements import elements_of, names_of
 from thenar.compiler.recordings.edits import TrialId
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.samples import Samples
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.hand import DrawnJoint, DrawnSwitch, HandDrawing
 from thenar.runtime.recipe import Recipe
@@ -45,7 +42,6 @@ class Recordings:
     numbering  what pages call this numbering
     hand       the glove laid flat, if it has the positions of the sensors
     parts      the part for each sensor, by its name; empty without a price list
-    levels     the element that a switch or a pad is read as, by its name: itself, or a level
     """
 
     grasp_set: GraspSet
@@ -54,7 +50,6 @@ class Recordings:
     numbering: str
     hand: HandShape | None
     parts: dict[str, Part]
-    levels: dict[str, str]
 
     @property
     def files(self) -> list[str]:
@@ -80,8 +75,6 @@ class ChoosePage:
         self._recordings: Recordings | None = None
         requests: dict[str, Handler] = {
             "choose": lambda asked: self._reply(asked.sensors),
-            "add": lambda asked: self._found("add", asked.sensors),
-            "drop": lambda asked: self._found("drop", asked.sensors),
             "use": self._use,
             **dict.fromkeys(("measure", "curve", "train"), self._job),
         }
@@ -96,12 +89,12 @@ class ChoosePage:
             quick = QuickAccuracy(grasp_set)
         except ThenarError as reason:
             self._recordings = None
-            self._studio.publish("set", why=str(reason), sensors=(), grasps=(), trials=(), name="")
+            self._studio.publish("set", why=str(reason), sensors=(), trials=(), name="")
             return
         of_rows = [trial for trial, none in zip(rows, grasp_set.is_none.tolist(), strict=True) if not none]
         ids = [of_rows[row] for row in np.unique(quick.trial, return_index=True)[1].tolist()]
         numbering = hashlib.sha256(msgspec.json.encode((ids, grasp_set.fingerprint()))).hexdigest()[:12]
-        now = Recordings(grasp_set, quick, ids, numbering, hand, parts, _levels(grasp_set))
+        now = Recordings(grasp_set, quick, ids, numbering, hand, parts)
         self._recordings = now
         kinds = ["switch"] * len(grasp_set.switch_names) + ["pad"] * len(grasp_set.taxel_columns)
         kinds += ["joint"] * len(grasp_set.joints)
@@ -109,7 +102,6 @@ class ChoosePage:
             "why": "",
             "name": ", ".join(now.files),
             "unused": unused,
-            "grasps": quick.grasps,
             "types": quick.held.taxonomy.types,
             "taxonomy": grasp_set.taxonomy.name,
             "hand": drawn(grasp_set, hand),
@@ -130,11 +122,6 @@ class ChoosePage:
             raise ThenarError("the recordings are not read yet")
         return self._recordings
 
-    def _found(self, do: str, sensors: tuple[int, ...]) -> bytes:
-        quick = self.recordings.quick
-        find = quick.best_next if do == "add" else quick.least
-        return message(do, sensor=find(sensors), sensors=sensors)
-
     def _use(self, asked: Asked) -> None:
         """Use a set, or leave it aside. Raises SettingError if there is no such set."""
         name, aside = self._project.path("set", asked.id).name, {*self._project.state.aside}
@@ -150,12 +137,13 @@ class ChoosePage:
     def _reply(self, sensors: Sequence[int]) -> bytes:
         now = self.recordings
         names, found = now.names(sensors), now.quick.of(sensors)
+        pads = [f"{name}>1" for name in now.grasp_set.taxel_names if name in names]  # read alike at any level
         return message(
             "quick",
             found,
             sensors=sensors,
             weakest=_weakest(now.quick, found),
-            scan_us=scan_time_us([now.levels[name] for name in names if name in now.levels]),
+            scan_us=scan_time_us([name for name in names if name in now.grasp_set.switch_names] + pads),
             price=sum(now.prices[name] for name in names) if now.parts else None,
             commands=self._commands(now.files, names),
         )
@@ -180,18 +168,18 @@ class ChoosePage:
         if now.names(asked.sensors) != names:
             raise ThenarError("the recordings have other sensors now: choose again")
         recipe = Recipe() if asked.do == "curve" else Recipe(sensors=len(names), have=names)
-        many: dict[str, Any] = {"jobs": self._studio.jobs}
+        jobs = self._studio.jobs
         if asked.do == "train":
             output = self._project.new_path(_BUILD)
             documents = Documents(now.hand, parts=now.parts)
-            built = compile_build(now.grasp_set, output, recipe, documents=documents, progress=report, **many)
+            built = compile_build(now.grasp_set, output, recipe, documents=documents, progress=report, jobs=jobs)
             content: dict[str, object] = {"folder": output.name, "facts": [str(fact) for fact in built.facts]}
             self._project.remember(build=output.name)
             self._studio.changed()
         else:
             limits = Limits.of(recipe, now.grasp_set, {}, prices=now.prices)
-            study = study_sensors(now.grasp_set, recipe, limits=limits, report=report, **many)
-            content = _content(study, now.quick.names)
+            study = study_sensors(now.grasp_set, recipe, limits=limits, jobs=jobs, report=report)
+            content = {**msgspec.to_builtins(study), "recipe": str(study.recipe)}
         return content | {"sensors": asked.sensors, "numbering": now.numbering}
 
 
@@ -203,31 +191,6 @@ def _weakest(quick: QuickAccuracy, found: Quick) -> str:
     truth, read = worst = max(sorted(pairs), key=lambda pair: pairs[pair])
     total = np.count_nonzero(quick.truth == truth)
     return f"{quick.grasps[truth]} recognised as {quick.grasps[read]}: {pairs[worst]} of {total} trials"
-
-
-def _levels(grasp_set: GraspSet) -> dict[str, str]:
-    held = grasp_set.without_none()
-    elements = elements_of(Samples.of(held), 1)
-    every = grasp_set.element_names
-    return {every[one.column]: name for one, name in zip(elements, names_of(held, elements), strict=True)}
-
-
-def _content(study: SensorStudy, names: Sequence[str]) -> dict[str, object]:
-    """Return the fields of a study that pages show: sensors are numbered in the order of `names`."""
-    numbers = {name: number for number, name in enumerate(names)}
-    return {
-        "of": study.of,
-        "enough": study.enough,
-        "recipe": str(study.recipe),
-        "points": [
-            {
-                "sensors": [numbers[name] for name in point.sensors],
-                **{name: getattr(point, name) for name in ("mean", "low", "high", "adapted", "papers")},
-                "worth": "" if point.worth is None else str(point.worth),
-            }
-            for point in study.points
-        ],
-    }
 
 
 def _joints(held: GraspSet) -> list[DrawnJoint]:

@@ -27,7 +27,7 @@ from .studio import Asked, Handler, Job, Report, Studio
 def add_compare_page(studio: Studio) -> None:
     """Add the page *Compare* to a studio."""
     requests: dict[str, Handler] = {
-        "compare": partial(_comparison, studio),
+        "compare": lambda asked: partial(_compare, studio.project, asked.ids, *_chosen(studio, asked)),
         "commands": partial(_commands, studio),
         **dict.fromkeys(("report", "firmware"), partial(_exporting, studio)),
     }
@@ -41,10 +41,6 @@ def _chosen(studio: Studio, asked: Asked) -> tuple[list[Path], list[Path]]:
         raise SettingError("choose two builds to compare, and recordings on which to compare them")
     builds = [studio.project.path("build", member) for member in asked.ids[:2]]
     return builds, [studio.project.path("set", member) for member in asked.ids[2:]]
-
-
-def _comparison(studio: Studio, asked: Asked) -> Job:
-    return partial(_compare, studio.project, asked.ids, *_chosen(studio, asked))
 
 
 def _compare(

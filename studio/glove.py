@@ -3,6 +3,7 @@
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -57,7 +58,7 @@ class GlovePage:
         self._proposal = ""
         self._past: Sequence[deque[tuple[float, int | None]]] = ()
         requests: Mapping[str, Callable[[Asked], bytes | None]] = {
-            "watch": self._on_watch,
+            "watch": lambda _: studio.station.start("watching", self._watch),
             "find": self._on_find,
             "connect": self._on_connect,
             "past": self._on_past,
@@ -67,13 +68,13 @@ class GlovePage:
 
     def read(self, report: Report) -> None:
         """Show the glove of the project, or what one can be connected to."""
-        there, why, lacks = self._project.harness.exists(), "", tuple[str, ...]()
-        content: dict[str, object] = {"hand": None, "names": (), "kinds": ()}
+        there, why = self._project.harness.exists(), ""
+        content: dict[str, object] = {"hand": None, "names": (), "kinds": (), "lacks": ()}
         if there:
             try:
-                sensors = self._sensors()
-                lacks = sensors.lacks
-                content = {"hand": sensors.drawing, "names": sensors.names, "kinds": sensors.kinds}
+                sensors = GloveSensors(self._project)
+                content = {"hand": sensors.drawing, "names": sensors.names}
+                content |= {"kinds": sensors.kinds, "lacks": sensors.lacks}
             except (ThenarError, OSError) as reason:
                 why = str(reason)
         ports = sorted(str(port) for pattern in _PORTS for port in Path("/dev").glob(pattern))
@@ -82,10 +83,7 @@ class GlovePage:
             "joint": self._project.command([*words, "-o", self._project.folder / _JOINTS_FILE]),
             "pad": self._project.command([*words, "--taxels", "-o", self._project.folder / _PADS_FILE]),
         }
-        self._studio.publish("glove-hand", content, there=there, why=why, lacks=lacks, ports=ports, commands=commands)
-
-    def _sensors(self) -> GloveSensors:
-        return GloveSensors(self._project.wiring(), self._project.hand())
+        self._studio.publish("glove-hand", content, there=there, why=why, ports=ports, commands=commands)
 
     def _on_find(self, asked: Asked) -> None:
         """Listen at an address, and propose a glove.toml."""
@@ -118,19 +116,9 @@ class GlovePage:
         write_atomically(self._project.harness, self._proposal.encode())
         self._studio.changed()
 
-    def _on_watch(self, _asked: Asked) -> None:
-        self._studio.station.start("watching", self._watch)
-
     def _watch(self, stop: Event) -> None:
-        try:
-            self._show(stop)
-        finally:
-            # A page that is opened later shows nothing old.
-            self._studio.publish("glove-state", states=())
-
-    def _show(self, stop: Event) -> None:
         """Show the state of every sensor, until `stop` is set."""
-        sensors = self._sensors()
+        sensors = GloveSensors(self._project)
         harness, kinds = self._project.wiring(), sensors.kinds
         past = self._past = [deque[tuple[float, int | None]](maxlen=_MOST_KEPT) for _ in kinds]
         last: list[int | None] = [None] * len(kinds)
@@ -138,7 +126,10 @@ class GlovePage:
         moved = dict.fromkeys(_LEAST_CHANGE, 0)
         came, rates = {"switches and pads": 0, "joints": 0}, dict[str, float]()
         shown_s = rated_s = monotonic()
-        with Sources(harness, harness.switches, whole_scan(harness, harness.switches, every_taxel=True)) as sources:
+        scan = whole_scan(harness, harness.switches, every_taxel=True)
+        with ExitStack() as ending, Sources(harness, harness.switches, scan) as sources:
+            # A page that is opened later shows nothing old.
+            ending.callback(self._studio.publish, "glove-state", states=())
             while not stop.is_set():
                 snapshot = sources.take(WAIT_US)
                 sources.raise_settings()

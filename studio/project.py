@@ -1,10 +1,10 @@
 """A project: the recordings, builds and settings that lie in one folder, and what the studio remembers of them."""
 
-import hashlib
 import os
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from shlex import join
 
@@ -36,7 +36,6 @@ class Member(msgspec.Struct, frozen=True):
     """A file or folder of a project, which pages name by its id."""
 
     id: str
-    kind: str
     name: str
 
 
@@ -102,7 +101,11 @@ class Project:
         found = sorted(path for path in self.folder.glob(_KINDS[kind]) if path.exists())
         names = [path.parent.name if kind == "build" else path.name for path in found]
         # A name that is no text cannot be sent to a page.
-        return [Member(_id(name), kind, name) for name in names if name == name.encode(errors="ignore").decode()]
+        return [
+            Member(sha256(name.encode()).hexdigest()[:12], name)
+            for name in names
+            if name == name.encode(errors="ignore").decode()
+        ]
 
     def path(self, kind: str, member: str) -> Path:
         """Return the path of a member. Raises SettingError if there is none of this id."""
@@ -234,7 +237,3 @@ def _fitting(sets: dict[str, GraspSet]) -> tuple[dict[str, GraspSet], list[str]]
         except RecordingError as reason:
             misfits.append(f"{name} is left aside: {reason}")
     return {name: one for name, one in sets.items() if name in fitting}, misfits
-
-
-def _id(name: str) -> str:
-    return hashlib.sha256(name.encode()).hexdigest()[:12]

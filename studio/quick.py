@@ -26,8 +26,6 @@ Floats = NDArray[np.float64]
 # The share of the mean variance that is added to each: sensors are few, and trials fewer.
 SHRINKAGE = 0.1
 _DECISIVE = 3
-# Of more rows, each sensor that could be added or dropped is tried on as many.
-_MOST_TRIED = 4000
 
 
 class Quick(msgspec.Struct, frozen=True):
@@ -107,23 +105,6 @@ class QuickAccuracy:
         read = decided(predicted[np.newaxis], self.trial)[0]
         return Quick(str(self._cut.of), rate.mean, rate.low, rate.high, tuple(read.tolist()))
 
-    def best_next(self, sensors: Sequence[int]) -> int | None:
-        """Return the sensor that raises the accuracy of rows most; None if all are there.
-
-        Raises EvaluationError if there is no sensor of a number.
-        """
-        self.check(sensors)
-        others = [one for one in range(len(self.names)) if one not in sensors]
-        return max(others, key=lambda one: self._right([*sensors, one]), default=None)
-
-    def least(self, sensors: Sequence[int]) -> int | None:
-        """Return the sensor without which the accuracy of rows falls least; None if there is none.
-
-        Raises EvaluationError if there is no sensor of a number.
-        """
-        self.check(sensors)
-        return max(sensors, key=lambda one: self._right([other for other in sensors if other != one]), default=None)
-
     def rows_of(self, trial: int) -> NDArray[np.intp]:
         """Return the rows of a trial. Raises EvaluationError if there is no such trial."""
         if not 0 <= trial < len(self.truth):
@@ -200,11 +181,6 @@ class QuickAccuracy:
         places -= places.min(axis=0)
         shares: Floats = (places / np.maximum(places.max(axis=0), 1e-9)).round(4)
         return shares
-
-    def _right(self, columns: list[int]) -> int:
-        labels, step = self._samples.labels, -(-len(self._samples.labels) // _MOST_TRIED)
-        several = ((fold, fold.test[::step]) for fold in self._folds)
-        return sum(int((self._predicted(fold, columns, rows) == labels[rows]).sum()) for fold, rows in several)
 
     @staticmethod
     def _weights(fold: _Sums, columns: list[int]) -> Floats:

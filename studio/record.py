@@ -59,7 +59,7 @@ class RecordPage:
             "continue": self._continue,
             "wear": self._wear,
             "recorded": lambda asked: self._last.seen(asked.trial),
-            "relabel": self._relabel,
+            "relabel": lambda asked: self._last.relabel(asked.trial, asked.name),
         }
         studio.add(requests, self.read)
         studio.publish("collecting", stage="over")
@@ -86,10 +86,6 @@ class RecordPage:
         if self._sitting is None:
             raise SettingError("nothing was recorded here yet: record, or use the page Errors")
         return self._sitting
-
-    def _relabel(self, asked: Asked) -> None:
-        self._last.relabel(asked.trial, asked.name)
-        self._studio.changed()
 
     def _unfinished(self) -> list[tuple[str, Path, Collection, int, int]]:
         """Return the collections that can be continued: id, path, collection, and trials done, of how many."""
@@ -237,7 +233,7 @@ class Sitting:
         self.output, self._adapts = recording.with_suffix(".grasps"), bool(collection.build)
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
-        self._sensors = GloveSensors(self._project.wiring(), self._project.hand())
+        self._sensors = GloveSensors(self._project)
         # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
         # step and the time.
         self._captured = dict[int, Frames]()
@@ -355,6 +351,7 @@ class Sitting:
         change(self._project.edits, [self._id(self.trials[number])], new)
         # It may have been undone meanwhile.
         restore(self._project.edits, self.output.name, {*(self._accepted or ())})
+        self._studio.changed()
 
 
 @lru_cache(maxsize=1024)

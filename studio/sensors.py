@@ -10,7 +10,7 @@ from thenar.runtime.calibration import load_calibration, numbers_of
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.hand import DrawnJoint, DrawnSwitch, DrawnTaxel, HandDrawing
-from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.timing import scan_us
@@ -24,10 +24,8 @@ class GloveSensors:
 
     Parameters
     ----------
-    harness : Harness
-        The glove.
-    hand : HandShape
-        On which switches and taxels are drawn, if it knows all of them.
+    project : Project
+        The project, on whose hand switches and taxels are drawn, if it knows all of them.
 
     Attributes
     ----------
@@ -40,11 +38,12 @@ class GloveSensors:
 
     Raises
     ------
-    ThenarError
-        If a calibration cannot be read.
+    ThenarError, OSError
+        If the glove's files cannot be read.
     """
 
-    def __init__(self, harness: Harness, hand: HandShape) -> None:
+    def __init__(self, project: Project) -> None:
+        harness = project.wiring()
         switches, taxels, joints = harness.switches, harness.taxel_names, harness.sensor_names
         self.names = (*switches, *taxels, *joints)
         self.kinds = ("switch",) * len(switches) + ("pad",) * len(taxels) + ("joint",) * len(joints)
@@ -54,9 +53,10 @@ class GloveSensors:
         self._lines = {line.name: line for line in (*known, *calibrated)}
         pads = calibration_of(harness.taxel_settings)
         self._pads = [None if pads is None else pads.line(name) for name in taxels]
-        self._switches = len(switches)
+        # The numbers of the first taxel and of the first joint.
+        self._pad, self._joint = len(switches), len(self.names) - len(joints)
         self.lacks = ("joint",) * (bool(joints) and path is None) + ("pad",) * (None in self._pads)
-        places, fields = placed((*switches, *taxels), hand)
+        places, fields = placed((*switches, *taxels), project.hand())
         angles = {line.name for line in calibrated}
         self.drawing = HandDrawing(
             **fields,
@@ -73,20 +73,19 @@ class GloveSensors:
 
     def read(self, switches: SwitchFrame | None, glove: GloveFrame | None) -> list[int | None]:
         """Return the value of each sensor: 1 or 0, the count of a taxel, the byte of a joint; None: it is not read."""
-        kinds = self.kinds
-        shown: list[int | None] = [None] * self._switches
+        shown: list[int | None] = [None] * len(self.names)
         if switches is not None:
             closed, lost = switches.closed, switches.lost
-            shown = [None if lost >> bit & 1 else closed >> bit & 1 for bit in range(self._switches)]
-        counts = None if switches is None else switches.taxels
-        joints = None if glove is None or not glove.plugged else [byte or None for byte in glove.sensors]
-        for kind, found in (("pad", counts), ("joint", joints)):
-            shown += [None] * kinds.count(kind) if found is None else found
+            shown[: self._pad] = [None if lost >> bit & 1 else closed >> bit & 1 for bit in range(self._pad)]
+        if switches is not None and switches.taxels is not None:
+            shown[self._pad : self._joint] = switches.taxels
+        if glove is not None and glove.plugged:
+            shown[self._joint :] = [byte or None for byte in glove.sensors]
         return shown
 
     def drawn(self, shown: Sequence[int | None]) -> dict[str, object]:
         """Return the drawn hand: `closed` and `lost` by bit, `pressed` from 0 to 1, `values` of the joints."""
-        first, last = self._switches, self._switches + len(self._pads)
+        first, last = self._pad, self._joint
         return {
             "closed": [value == 1 for value in shown[:first]] + [False] * len(self._pads),
             "lost": [value is None for value in shown[:last]],

@@ -20,7 +20,6 @@ from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.names import list_names
 from thenar.runtime.published import NONE
-from thenar.runtime.web.server import message
 
 from .studio import Asked, Handler, Job, Report, Studio
 
@@ -30,34 +29,34 @@ class WearerPage:
 
     def __init__(self, studio: Studio) -> None:
         self._studio, self._project = studio, studio.project
-        requests: dict[str, Handler] = {
-            "wearer": self._name,
-            "chosen": self._chosen,
-            "adapt": self._job,
-            "unwear": self._undo,
-        }
+        # The wearer's sets for the build, as they were last read.
+        self._sets = list[Path]()
+        requests: dict[str, Handler] = {"wearer": self._name, "adapt": self._job, "unwear": self._undo}
         studio.add(requests, self.read)
 
     def read(self, report: Report) -> None:
-        """Show the build of everybody, and which sets hold trials of the wearer for it."""
-        state = self._project.state
+        """Show the build of everybody, and the trials of the wearer for it."""
+        state, sets = self._project.state, dict[Path, str]()
         about: dict[str, object] = {"wearer": state.wearer}
         try:
             base, build = self.base()
+            members = self._project.members("set")
+            for number, member in enumerate(members):
+                report(number, len(members))
+                path = self._project.folder / member.name
+                if (grasp_set := self._fitting(path, build)) is not None:
+                    sets[path] = f"{path.name}: {grasp_set.size}"
+            self._sets = [*sets]
+            if sets:
+                about |= self._trials_shown(base, build)
         except ThenarError as reason:
+            self._sets = []
             self._studio.publish("wearing", about, why=str(reason), sets=())
             return
-        members = self._project.members("set")
-        sets = []
-        for number, member in enumerate(members):
-            report(number, len(members))
-            grasp_set = self._fitting(self._project.folder / member.name, build)
-            if grasp_set is not None:
-                sets.append({"id": member.id, "name": member.name, "size": str(grasp_set.size)})
         types = [grasp for grasp in build.grasps if grasp != NONE]
         record = ["record", "--glove", self._project.harness, "--for", base, "--subject", state.wearer]
         record += ["-o", self._project.new_path(state.wearer, ".grasps", ".mcap")]
-        about |= {"base": base.name, "types": types, "sets": sets, "glove": self._project.harness.exists()}
+        about |= {"base": base.name, "types": types, "sets": [*sets.values()], "glove": self._project.harness.exists()}
         about |= {"build": state.build, "undo": self._former, "record": self._project.command(record)}
         self._studio.publish("wearing", about, why="")
 
@@ -97,44 +96,36 @@ class WearerPage:
         self._project.remember(wearer=asked.name)
         self._studio.changed()
 
-    def _sets(self, asked: Asked) -> list[Path]:
-        if not asked.ids:
-            raise SettingError("choose recordings of the wearer, or record some")
-        return [self._project.path("set", member) for member in asked.ids]
-
     def _trials(self, paths: Sequence[Path], build: Build) -> tuple[GraspSet, list[str]]:
-        """Return the trials in sets, and their types that the build does not know. Raises SettingError unless they are
-        the wearer's.
-        """
-        for path in paths:
-            if self._fitting(path, build) is None:
-                raise SettingError(f"{path.name} is no recording of {self._project.state.wearer} for this build")
+        """Return the trials in sets, and their types that the build does not know."""
         whole = self._project.recordings(paths)[0]
         return whole, sorted({*whole.grasps.tolist()} - {*build.grasps, NONE})
 
-    def _chosen(self, asked: Asked) -> bytes:
-        """Return the numbers of trials in chosen sets, by type, and the command that adapts to them."""
-        paths, (base, build) = self._sets(asked), self.base()
-        trials, added = self._trials(paths, build)
+    def _trials_shown(self, base: Path, build: Build) -> dict[str, object]:
+        """Return the numbers of the wearer's trials, by type, and the command that adapts to them."""
+        trials, added = self._trials(self._sets, build)
         counts = Counter(trials.grasps[np.unique(trials.trial_ids, return_index=True)[1]].tolist())
         known = int(np.count_nonzero(trained_on(build.manifest, trials)))
         notes = [f"new types are added: {list_names(added)}"] if added else []
         notes += [f"{known} of these trials are of the build's training: before is too good"] if known else []
         more = [word for name in added for word in ("--add-type", name)]
         more += ["-o", str(self._project.new_path(self._project.state.wearer))]
-        command = self._project.command(["adapt", base], paths, more)
-        return message("chosen", ids=asked.ids, counts=counts, notes=notes, command=command)
+        return {"counts": counts, "notes": notes, "adapt": self._project.command(["adapt", base], self._sets, more)}
 
     # The build.
 
-    def _job(self, asked: Asked) -> Job:
-        paths = self._sets(asked)
-        self.base()
-        return partial(self.adapt, paths)
+    def _job(self, _: Asked) -> Job:
+        if not self._sets:
+            raise SettingError(f"no set holds only trials of {self._project.state.wearer}: record some")
+        return partial(self.adapt, self._sets)
 
     def adapt(self, paths: Sequence[Path], _: Report) -> dict[str, object]:
         """Adapt the build of everybody to trials, put the result into use, and return its accuracy."""
         base, build = self.base()
+        for path in paths:
+            # The wearer may have been another when this was asked for.
+            if self._fitting(path, build) is None:
+                raise SettingError(f"{path.name} is no recording of {self._project.state.wearer} for this build")
         trials, added = self._trials(paths, build)
         output = self._project.new_path(self._project.state.wearer)
         made = adapt(base, trials, output=output, add_type=added)

@@ -69,11 +69,12 @@ def choose_page(folder: Path) -> Iterator[str]:
 
 
 def choose_sensors(driver: webdriver.Chrome, wait: WebDriverWait[webdriver.Chrome]) -> None:
-    """Let the page add the best sensor six times."""
-    for number in range(7):
-        wait.until(lambda _, number=number: driver.find_element("id", "count").text.startswith(f"{number} of "))
-        if number < 6:
-            driver.find_element("id", "add").click()
+    """Choose the six sensors of the curve."""
+    wait.until(lambda _: driver.find_element("id", "count").text)
+    driver.find_element("id", "curve").click()
+    wait.until(lambda _: driver.find_elements("css selector", "#points button"))[5].click()
+    wait.until(lambda _: driver.find_element("id", "count").text.startswith("6 of "))
+    driver.execute_script("document.getElementById('with-set').scrollIntoView()")
 
 
 def main() -> None:

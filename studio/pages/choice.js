@@ -1,5 +1,5 @@
 // What pages of the studio share: the sensors that are in use, boxes, keys, and what was trained.
-import { $, box, button, list, make, say } from "./wire.js";
+import { $, box, button, list, make, say, tell } from "./wire.js";
 
 // The sensors are those of all pages in this tab; a reload and a restart of the server keep them.
 const KEY = "thenar.sensors";
@@ -24,6 +24,11 @@ export function percent(share) {
   return (100 * share).toFixed(1);
 }
 
+/** Return a difference of shares in points, with its sign. */
+export function points(share) {
+  return `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
+}
+
 /** Return the time of a scan of sensors, in words. */
 export function scanTime(us) {
   if (us === null) return "unknown: they are more than the chips of one bus read";
@@ -40,9 +45,6 @@ export function listBoxes(element, members, changed) {
   if (labels.length !== before.size || labels.some((label, at) => label !== element.children[at])) element.replaceChildren(...labels);
 }
 
-/** Return the ids of the members whose boxes are ticked. */
-export const ticked = (element) => [...element.querySelectorAll(":checked")].map(({ value }) => value);
-
 /**
  * Show the keys that count now as buttons, the usual one first, with their letters if they have some.
  * @returns {?HTMLButtonElement} the first one, or null if the keys are those of before
@@ -53,11 +55,19 @@ export function showKeys(keys, ask, letters = {}) {
   $("keys").dataset.keys = said;
   const buttons = words.map(([key, what], at) => {
     const made = button(what, () => ask("key", { name: key }), { class: at ? "plain" : "", "data-key": key });
-    if (letters[key]) made.append(make("kbd", {}, letters[key]));
+    if (letters[key]) made.append(" ", make("kbd", {}, letters[key]));
     return made;
   });
   $("keys").replaceChildren(...buttons);
   return buttons[0] ?? null;
+}
+
+/** Let a form do this when it is sent, instead of loading another page. */
+export function onSubmit(id, act) {
+  $(id).addEventListener("submit", (event) => {
+    event.preventDefault();
+    act();
+  });
 }
 
 /** Show the last edit of trials, which can be undone. */
@@ -68,7 +78,6 @@ export function showLastEdit(words) {
 
 /** Show what was trained. */
 export function trained({ folder, facts }) {
-  $("build").hidden = false;
-  say($("build-heading"), `Trained: ${folder}`);
+  tell("build-heading", `Trained: ${folder}`);
   list($("facts"), facts);
 }

@@ -1,5 +1,5 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { interval, listBoxes, percent, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
+import { interval, listBoxes, percent, points, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
 import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
@@ -14,7 +14,6 @@ let shown = null; // the last reply
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
-  open: () => set && !set.why && choose(chosen),
   project: ({ sets, state: { aside, took } }) => {
     listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name })), ({ target }) => {
       ask("use", { id: target.value, value: Number(target.checked) });
@@ -40,25 +39,18 @@ const ask = openPage({
     choose(storedChoice(set.sensors));
   },
   quick: (reply) => {
-    if (isChosen(reply.sensors)) show(reply);
+    // A reply to an earlier choice comes too late.
+    if (String(reply.sensors) === String(chosen)) show(reply);
   },
-  add: ({ sensor, sensors }) => {
-    if (sensor !== null && isChosen(sensors)) choose([...chosen, sensor]);
-  },
-  drop: ({ sensor, sensors }) => {
-    if (sensor !== null && isChosen(sensors)) choose(chosen.filter((one) => one !== sensor));
-  },
-  measure: ({ sensors, points, of, recipe, numbering }) => {
+  measure: ({ sensors, points: [point], of, recipe, numbering }) => {
     if (numbering !== set.numbering) return;
-    measured.set(key(sensors), { ...points[0], of, recipe });
+    measured.set(key(sensors), { ...point, of, recipe });
     certify();
   },
   curve: (curve) => curve.numbering === set.numbering && drawCurve(curve),
   train: trained,
 });
 
-// A reply to an earlier choice comes too late.
-const isChosen = (sensors) => String(sensors) === String(chosen);
 const key = (sensors) => [...sensors].sort((a, b) => a - b).join(",");
 
 function toggle(sensor) {
@@ -102,8 +94,7 @@ function show(reply) {
   say($("scan"), scanTime(reply.scan_us));
   $("price").hidden = $("price-term").hidden = reply.price === null;
   if (reply.price !== null) say($("price"), reply.price.toFixed(2));
-  const change = before && before.sensors.length !== chosen.length ? 100 * (reply.mean - before.mean) : null;
-  const moved = change === null ? "" : `; ${change >= 0 ? "+" : ""}${change.toFixed(1)} points by the last click`;
+  const moved = before && before.sensors.length !== chosen.length ? `; ${points(reply.mean - before.mean)} points by the last click` : "";
   say($("change"), `trials, ${reply.of}; quick: not nested, and chosen while looking at it${moved}`);
   say($("weakest"), reply.weakest);
   for (const what of ["measure", "curve", "train"]) say($(`${what}-command`), reply.commands[what] ?? "choose a sensor");
@@ -120,28 +111,34 @@ function certify() {
 
 /* ---- The curve: what sensors are worth, as a table and as a front of points to click on ---- */
 
-function drawCurve({ points, of, enough }) {
+/** Return the worth of the last sensor of a point, in words. */
+const worth = ({ worth: gain }) => gain && `${points(gain.mean)} [${percent(gain.low)}, ${percent(gain.high)}]`;
+
+/** Choose the sensors with these names. */
+const chooseNamed = (names) => choose(names.map((name) => set.sensors.findIndex((one) => one.name === name)));
+
+function drawCurve({ points: found, of, enough }) {
   $("curve-panel").hidden = false;
   const titles = ["Sensors", `${of}, %`, "Worth of the last, points", "After 2 own trials, %", ""];
-  fillTable("points", titles, points.map((point) => {
-    const number = point.sensors.length;
+  fillTable("points", titles, found.map((point) => {
+    const { number, mean, low, high, adapted } = point;
     return [
       number === enough ? `${number}: more matter little` : number,
-      `${percent(point.mean)} [${percent(point.low)}, ${percent(point.high)}]`,
-      point.worth || "–",
-      point.adapted === null ? "–" : percent(point.adapted),
-      button(`Choose these ${number}`, () => choose(point.sensors)),
+      `${percent(mean)} [${percent(low)}, ${percent(high)}]`,
+      worth(point) ?? "–",
+      adapted === null ? "–" : percent(adapted),
+      button(`Choose these ${number}`, () => chooseNamed(point.sensors)),
     ];
   }));
-  $("points").children[points.findIndex(({ sensors }) => sensors.length === enough)]?.setAttribute("aria-current", "true");
-  drawFront(points, of);
-  detail(points.find(({ sensors }) => sensors.length === enough), of);
+  $("points").children[found.findIndex(({ number }) => number === enough)]?.setAttribute("aria-current", "true");
+  drawFront(found, of);
+  detail(found.find(({ number }) => number === enough), of);
 }
 
-const BOX = { left: 46, right: 470, top: 10, bottom: 262 };
+const BOX = { left: 52, right: 470, top: 10, bottom: 262 };
 
-function drawFront(points, of) {
-  const svg = $("front"), most = Math.max(...points.map(({ sensors }) => sensors.length));
+function drawFront(found, of) {
+  const svg = $("front"), most = Math.max(...found.map(({ number }) => number));
   const x = (number) => BOX.left + (number / (most + 0.5)) * (BOX.right - BOX.left);
   const y = (share) => BOX.bottom - share * (BOX.bottom - BOX.top);
   const words = (left, top, text, anchor = "middle") => draw("text", { x: left, y: top, "text-anchor": anchor }, text);
@@ -152,17 +149,17 @@ function drawFront(points, of) {
   const step = Math.ceil(most / 8);
   for (let number = step; number <= most; number += step) parts.push(words(x(number), BOX.bottom + 16, number));
   parts.push(words((BOX.left + BOX.right) / 2, BOX.bottom + 33, "number of sensors"));
-  const line = points.map(({ sensors, mean }) => `${x(sensors.length)} ${y(mean)}`).join("L");
+  const line = found.map(({ number, mean }) => `${x(number)} ${y(mean)}`).join("L");
   parts.push(draw("path", { class: "front", d: `M${line}` }));
   svg.replaceChildren(...parts);
-  for (const point of points) {
-    const number = point.sensors.length;
+  for (const point of found) {
+    const { number } = point;
     const spot = draw(
       "g",
       { class: "point" },
       draw("path", { d: `M${x(number)} ${y(point.low)}V${y(point.high)}` }),
-      draw("circle", { cx: x(number), cy: y(point.mean), r: 5 }),
-      draw("rect", { x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
+      draw("circle", { class: "open", cx: x(number), cy: y(point.mean), r: 5 }),
+      draw("rect", { class: "area", x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
     );
     svg.append(pressable(spot, `${number} sensors: ${interval(point)}`, () => detail(point, of)));
   }
@@ -170,17 +167,17 @@ function drawFront(points, of) {
 
 /** Show what a point of the front is. */
 function detail(point, of) {
-  const number = point.sensors.length;
+  const { number } = point;
   for (const spot of $("front").querySelectorAll(".point")) {
     spot.setAttribute("aria-pressed", spot.getAttribute("aria-label").startsWith(`${number} sensors`));
   }
   say($("point-heading"), `${number} ${number === 1 ? "sensor" : "sensors"}: ${interval(point)}, ${of}`);
-  say($("point-about"), point.worth && `the last one is worth ${point.worth} points`);
-  say($("point-sensors"), point.sensors.map((sensor) => set.sensors[sensor].name).join(", "));
+  tell("point-about", point.worth && `the last one is worth ${worth(point)} points`);
+  say($("point-sensors"), point.sensors.join(", "));
   say($("point-choose"), number === 1 ? "Choose this sensor" : `Choose these ${number} sensors`);
-  $("point-choose").onclick = () => choose(point.sensors);
+  $("point-choose").onclick = () => chooseNamed(point.sensors);
 }
 
-for (const what of ["add", "drop", "measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));
+for (const what of ["measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));
 $("curve").addEventListener("click", () => ask("curve"));
 $("clear").addEventListener("click", () => choose([]));

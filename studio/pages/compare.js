@@ -1,15 +1,13 @@
 // The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { listBoxes, percent, scanTime, ticked } from "./choice.js";
+import { interval, listBoxes, points, scanTime } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
 import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 
-// Up: only b, down: only a; shapes differ as well as colours.
-const SIGNS = { both: "M0-4L4 0L0 4L-4 0Z", a: "M-4-3H4L0 4Z", b: "M-4 3H4L0-4Z" };
+const SIGNS = { both: "ab", a: "a", b: "b" };
 
 const ask = openPage({
-  open: () => commands(),
   project: ({ builds, sets, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
@@ -35,7 +33,7 @@ const ask = openPage({
   firmware: (made) => exported(made),
 });
 
-const request = () => [$("a").value, $("b").value, ...ticked($("sets"))];
+const request = () => [$("a"), $("b"), ...$("sets").querySelectorAll(":checked")].map(({ value }) => value);
 
 /** Ask for the commands that do what the buttons do. */
 function commands() {
@@ -44,22 +42,16 @@ function commands() {
 
 function exported({ said, address, name }) {
   say($("exported"), said);
-  $("download").hidden = false;
-  const link = $("download").firstChild;
-  link.href = address;
-  link.download = name;
-  say(link, `Save ${name}`);
+  $("download").replaceChildren(make("a", { href: address, download: name }, `Save ${name}`));
   commands();
 }
-
-const points = (share) => `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
 
 function show({ builds, hand, both, only, found, said, unused }) {
   $("result").hidden = false;
   say($("said"), said);
   list($("unused"), unused);
   const rows = [
-    ["Recognised of these trials", ({ right, ends }) => `${percent(right / found.trials)} % [${ends.map(percent).join(", ")}]`],
+    ["Recognised of these trials", ({ right, ends: [low, high] }) => interval({ mean: right / found.trials, low, high })],
     ["Sensors", (build) => build.sensors],
     ["Scan of switches and pads", (build) => scanTime(build.scan_us)],
     ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
@@ -87,24 +79,20 @@ function linked({ trial, subject, object, recorded }) {
   return make("a", { href: `errors.html#${encodeURIComponent(`${words}: ${recorded}`)}` }, words);
 }
 
-const sign = (kind, size) => draw("path", { class: `sign ${kind}`, d: SIGNS[kind], transform: `scale(${size})` });
-
-/** Draw one hand on which a sign says which build reads a sensor, and list all sensors by their signs. */
+/** Draw one hand on which letters say which build reads a sensor, and list all sensors by their builds. */
 function overlay(hand, kept, builds) {
   const kinds = new Map(Object.entries(kept).flatMap(([kind, names]) => names.map((name) => [name, kind])));
   $("hand").toggleAttribute("hidden", !hand.switches.length);
   drawHand($("hand"), { ...hand, switches: hand.switches.map(({ bit, ...one }) => (kinds.has(one.name) ? { ...one, bit } : one)) });
   for (const spot of $("hand").querySelectorAll(".spot")) {
     const kind = kinds.get(spot.querySelector("title").textContent);
-    if (kind) spot.append(sign(kind, hand.radius_mm / 2));
+    if (kind) spot.append(draw("text", { class: `sign ${kind} middle` }, SIGNS[kind]));
   }
   $("hand").setAttribute("aria-label", "The hand with the sensors of both builds, which the list names");
   const titles = { both: "both", a: `only a (${builds[0].name})`, b: `only b (${builds[1].name})` };
-  const entries = Object.entries(kept).map(([kind, names]) => {
-    const picture = draw("svg", { viewBox: "-5 -5 10 10", "aria-hidden": "true" }, sign(kind, 1));
-    return make("li", {}, picture, `${titles[kind]}: ${names.length ? `${names.length}, ${names.join(", ")}` : "none"}`);
-  });
-  $("legend").replaceChildren(...entries);
+  list($("legend"), Object.entries(kept).map(([kind, names]) => {
+    return `${titles[kind]}: ${names.length ? `${names.length}, ${names.join(", ")}` : "none"}`;
+  }));
 }
 
 /** What was compared before is another matter. */

@@ -24,7 +24,6 @@ const map = new TrialMap($("map"), {
 });
 
 const ask = openPage({
-  open: () => set && !set.why && look(),
   set: (message) => {
     if (set && set.numbering === message.numbering && set.why === message.why) return;
     // Where a trial was left out, the next one has its number.
@@ -251,11 +250,6 @@ $("relabel").addEventListener("click", () => edit($("type").value));
 $("drop").addEventListener("click", () => edit(""));
 $("undo").addEventListener("click", () => ask("undo"));
 $("show-more").addEventListener("click", () => askFor($("trials").querySelectorAll("article").length));
-$("lasso").addEventListener("click", () => {
-  const on = $("lasso").getAttribute("aria-pressed") !== "true";
-  $("lasso").setAttribute("aria-pressed", String(on));
-  map.touch = on;
-});
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select, input:not([type=checkbox])")) return;
   if (event.key === "n" || event.key === "p") nextError(event.key === "n" ? 1 : -1);

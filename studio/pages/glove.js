@@ -1,6 +1,6 @@
 // The page Glove: a glove is connected, watched and calibrated.
 import { draw, drawHand } from "./hand.js";
-import { showKeys } from "./choice.js";
+import { onSubmit, showKeys } from "./choice.js";
 import { openPage } from "./shell.js";
 import { $, button, clock, fillTable, list, make, say } from "./wire.js";
 
@@ -110,8 +110,6 @@ function showState(message) {
     connected ? error || "connected" : `lost: ${error}`,
     counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
   ]);
-  if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
-  $("devices-table").dataset.rows = JSON.stringify(rows);
   fillTable("devices", ["Device", "State", "Counted"], rows);
 }
 
@@ -166,7 +164,7 @@ $("problem").addEventListener("click", () => {
 
 function showStep({ step, what, problems, faults, keys }) {
   const open = Boolean(step);
-  if (open === $("calibration").hidden) $("refused").textContent = open ? "" : $("refused").textContent;
+  if (open && $("calibration").hidden) say($("refused"), "");
   $("calibration").hidden = !open;
   if (!open) return;
   say($("step"), step);
@@ -176,10 +174,7 @@ function showStep({ step, what, problems, faults, keys }) {
   showKeys(keys, ask)?.focus();
 }
 
-$("form").addEventListener("submit", (event) => {
-  event.preventDefault();
-  ask("find", { name: $("address").value.trim() });
-});
+onSubmit("form", () => ask("find", { name: $("address").value.trim() }));
 $("connect").addEventListener("click", () => {
   begun = false;
   ask("connect");

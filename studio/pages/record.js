@@ -1,10 +1,10 @@
 // The page Record: a collection is begun, led key by key, and ends with a set.
-import { percent, showKeys, showLastEdit, trained } from "./choice.js";
+import { interval, onSubmit, showKeys, showLastEdit, trained } from "./choice.js";
 import { drawGrasp } from "./grasps.js";
 import { drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
-import { $, button, fillMenu, list, make, say } from "./wire.js";
+import { $, button, fillMenu, list, make, say, tell } from "./wire.js";
 
 const LETTERS = { accept: "Enter", redo: "r", undo: "u", skip: "s", pause: "p", quit: "q" };
 
@@ -178,18 +178,15 @@ function markTrials() {
 function accuracyWords(accuracy) {
   if (!accuracy) return "An accuracy is shown from two trials of every type on.";
   if (accuracy.why) return `No accuracy: ${accuracy.why}`;
-  const { mean, low, high, of } = accuracy;
-  return `All sensors tell these trials apart in ${percent(mean)} % [${percent(low)}, ${percent(high)}], ${of}; quick: not nested`;
+  return `All sensors tell these trials apart in ${interval(accuracy)}, ${accuracy.of}; quick: not nested`;
 }
 
 $("repetitions").value = query.get("repetitions") ?? $("repetitions").value;
-$("only").hidden = !only.length;
-say($("only"), `Only of ${only.join(" and ")}.`);
+tell("only", only.length && `Only of ${only.join(" and ")}.`);
 if (only.length) $("none").checked = false;
 $("subject").addEventListener("input", () => (edited = true));
 $("taxonomy").addEventListener("change", askTypes);
-$("form").addEventListener("submit", (event) => {
-  event.preventDefault();
+onSubmit("form", () => {
   ask("record", {
     name: $("subject").value.trim(),
     id: $("taxonomy").value,
@@ -199,10 +196,7 @@ $("form").addEventListener("submit", (event) => {
     ids: only,
   });
 });
-$("relabel").addEventListener("submit", (event) => {
-  event.preventDefault();
-  ask("relabel", { trial: seen, name: $("type").value });
-});
+onSubmit("relabel", () => ask("relabel", { trial: seen, name: $("type").value }));
 $("drop").addEventListener("click", () => ask("relabel", { trial: seen, name: "" }));
 $("undo").addEventListener("click", () => ask("undo"));
 // After a click of the mouse, Enter is the key of the recording again.

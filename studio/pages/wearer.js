@@ -1,30 +1,19 @@
 // The page Wearer: a few trials of a person, a build that is adapted to them, and the way back.
-import { listBoxes, ticked } from "./choice.js";
+import { onSubmit } from "./choice.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
 import { $, fillTable, list, say, tell } from "./wire.js";
 
-let state = null; // the message on the wearer and the build
 let begun = false; // whether this page has just begun to record
 let awaited = false; // whether it has just asked to adapt
 
 const ask = openPage({
-  open: () => choose(),
   wearing: (message) => {
     const { wearer, why } = message;
     if (document.activeElement !== $("subject")) $("subject").value = wearer;
-    state = message;
     tell("empty", why);
     $("with-build").hidden = Boolean(why);
     if (!why) show(message);
-  },
-  chosen: ({ ids, counts, notes, command }) => {
-    if (String(ids) !== String(ticked($("sets")))) return;
-    const types = Object.entries(counts).map(([type, count]) => `${type} ${count}`);
-    const lacking = state.types.filter((type) => !counts[type]);
-    say($("counts"), `Trials: ${types.join(", ")}${lacking.length ? `; none of ${lacking.join(", ")}, which change as the others do` : ""}`);
-    list($("notes"), notes);
-    say($("adapt-command"), command);
   },
   adapt: (result) => {
     $("result").hidden = false;
@@ -49,35 +38,27 @@ const ask = openPage({
   },
 });
 
-function show({ wearer, base, build, types, sets: members, glove, record, undo }) {
+function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt = "", glove, record, undo }) {
   say($("use"), build === base ? `${build}: that of everybody` : `${build}: adapted from ${base}`);
   tell("undo", undo && `Undo: use ${undo} again`);
   say($("plan"), glove ? `Two trials of each of ${types.length} types; three if you add one.` : "The project has no glove.toml: connect a glove first.");
   for (const one of $("record").elements) one.disabled = !glove;
   say($("record-command"), record);
-  listBoxes($("sets"), members.map(({ id, name, size }) => ({ id, text: `${name}: ${size}`, checked: true })), choose);
-  tell("no-sets", !members.length && `no set holds only trials of ${wearer}`);
-  choose();
+  tell("no-sets", !sets.length && `no set holds only trials of ${wearer}`);
+  list($("sets"), sets);
+  const lacking = types.filter((type) => !counts[type]);
+  const trials = Object.entries(counts).map(([type, count]) => `${type} ${count}`).join(", ");
+  say($("counts"), trials && `Trials: ${trials}${lacking.length ? `; none of ${lacking.join(", ")}, which change as the others do` : ""}`);
+  list($("notes"), notes);
+  $("adapt").disabled = !sets.length;
+  say($("adapt-command"), adapt);
 }
 
-/** Ask what is in the ticked sets. */
-function choose() {
-  const ids = ticked($("sets"));
-  $("adapt").disabled = !ids.length;
-  for (const id of ["counts", "adapt-command"]) say($(id), "");
-  list($("notes"), []);
-  if (ids.length) ask("chosen", { ids });
-}
-
-$("who").addEventListener("submit", (event) => {
-  event.preventDefault();
-  ask("wearer", { name: $("subject").value });
-});
-$("record").addEventListener("submit", (event) => {
-  event.preventDefault();
+onSubmit("who", () => ask("wearer", { name: $("subject").value }));
+onSubmit("record", () => {
   begun = ask("wear", { name: $("type").value });
 });
 $("adapt").addEventListener("click", () => {
-  awaited = ask("adapt", { ids: ticked($("sets")) });
+  awaited = ask("adapt");
 });
 $("undo").addEventListener("click", () => ask("unwear"));

@@ -188,13 +188,17 @@ def test_the_map_is_pointed_at_clicked_and_encircled(browser: Browser, studio: S
     line = [(0, low), (right, low), (right, high), (0, high)]
     loop(browser, line)
     browser.wait(lambda: browser.text("selection-heading") == f"{inside} trials selected")
-    # A finger scrolls, until the button says that it draws.
     browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
     cards(browser, 1)
-    before = browser.text("selection-heading")
-    assert finger(browser, line) == before
-    browser.driver.find_element(By.ID, "lasso").send_keys(Keys.SPACE)
-    assert finger(browser, line) == f"{inside} trials selected"
+    on_map(browser, reply)
+    finger(browser, line)
+    browser.wait(lambda: browser.text("selection-heading") == f"{inside} trials selected")
+    # Up or down, it scrolls.
+    on_map(browser, reply)
+    at = scrolled(browser)
+    finger(browser, [(0, -100), (0, 100)])
+    browser.wait(lambda: scrolled(browser) < at - 50)
+    assert browser.text("selection-heading") == f"{inside} trials selected"
     canvas.send_keys(Keys.ARROW_RIGHT)
     for key in (Keys.ARROW_LEFT, Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_DOWN):
         canvas.send_keys(key)
@@ -204,19 +208,24 @@ def test_the_map_is_pointed_at_clicked_and_encircled(browser: Browser, studio: S
     browser.wait(lambda: browser.text("selection-heading") == named)
 
 
-def finger(browser: Browser, line: list[tuple[int, int]]) -> str:
-    """Draw a line with a finger, and return what is selected then."""
-    script = """const map = document.getElementById("map"), {left, top, width, height} = map.getBoundingClientRect();
-        const send = (kind, [x, y]) => map.dispatchEvent(new PointerEvent(kind, {
-            pointerId: 1, pointerType: "touch", bubbles: true,
-            clientX: left + width / 2 + x, clientY: top + height / 2 + y,
-        }));
-        map.setPointerCapture = () => {};
-        send("pointerdown", arguments[0][0]);
-        for (const place of arguments[0]) send("pointermove", place);
-        send("pointerup", arguments[0].at(-1));
-        return document.getElementById("selection-heading").textContent;"""
-    return str(browser.script(script, line))
+def finger(browser: Browser, line: list[tuple[int, int]]) -> None:
+    """Draw a line on the map with a finger."""
+    script = """const { x, y, width, height } = document.getElementById("map").getBoundingClientRect();
+        return [x + width / 2, y + height / 2]"""
+    x, y = browser.script(script)
+    corners = np.array(line)
+    for share in np.arange(0, len(line) - 1, 0.1):
+        corner, rest = int(share), share % 1
+        place = corners[corner] + rest * (corners[corner + 1] - corners[corner])
+        points = [{"x": x + float(place[0]), "y": y + float(place[1])}]
+        touch = {"type": "touchMove" if share else "touchStart", "touchPoints": points}
+        browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", touch)
+    browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+
+def scrolled(browser: Browser) -> float:
+    """Return how far the page is scrolled, in pixels."""
+    return float(browser.script("return scrollY"))
 
 
 def test_trials_are_relabelled_left_out_and_taken_back(browser: Browser, studio: Start, tmp_path: Path) -> None:

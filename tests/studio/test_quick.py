@@ -1,7 +1,5 @@
 """The quick accuracy of sensors, compared with discriminants by scipy, row by row."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -72,36 +70,6 @@ def misread(quick: QuickAccuracy, found: Quick) -> list[int]:
 def test_the_truth_of_trials_is_their_type(people: GraspSet, quick: QuickAccuracy) -> None:
     assert [quick.grasps[truth] for truth in quick.truth] == people.grasps.tolist()
     assert misread(quick, quick.of([0, 1]))
-
-
-def test_the_best_next_and_the_least_are_those_of_all_trials(quick: QuickAccuracy) -> None:
-    """Every row is a trial here, so the accuracies of both are the same."""
-    best, least = quick.best_next([2]), quick.least([0, 2, 8])
-    assert best is not None
-    assert least is not None
-    assert quick.of([2, best]).mean == max(quick.of([2, one]).mean for one in range(10) if one != 2)
-    assert quick.of([one for one in (0, 2, 8) if one != least]).mean == max(
-        quick.of([one for one in (0, 2, 8) if one != other]).mean for other in (0, 2, 8)
-    )
-    assert quick.best_next(range(10)) is None
-    assert quick.least([]) is None
-
-
-def test_sensors_are_tried_on_a_part_of_many_rows(people: GraspSet, monkeypatch: pytest.MonkeyPatch) -> None:
-    """So a click on a hundred thousand rows is answered; every trial has rows in the part."""
-    many = QuickAccuracy(people.rows(np.repeat(np.arange(72), 200)))
-    tried, predicted = list[int](), QuickAccuracy._predicted
-
-    def counted(self: QuickAccuracy, fold: Any, columns: list[int], rows: np.ndarray) -> np.ndarray:
-        tried.append(len(rows))
-        return predicted(self, fold, columns, rows)
-
-    monkeypatch.setattr(QuickAccuracy, "_predicted", counted)
-    few = QuickAccuracy(people)
-    for sensors in ([], [2], [0, 2, 8]):
-        assert many.best_next(sensors) == few.best_next(sensors)
-        assert many.least(sensors) == few.least(sensors)
-    assert max(tried) <= 4000 / 4
 
 
 def test_on_the_map_types_are_as_far_apart_as_scikit_learn_finds_them(people: GraspSet, quick: QuickAccuracy) -> None:
