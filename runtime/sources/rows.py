@@ -4,7 +4,6 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 from thenar.drivers.lines import CLOCK_US, SEQUENCES, UNITS_US, Row, RowReader
 from thenar.drivers.senders import SILENCE_US
@@ -14,7 +13,7 @@ from ..harness.wiring import Harness, Range, StreamWiring
 from ..names import list_names, shortened
 from ..published import Count
 from ..scanning.scanmap import ScanMap
-from ..taxels import Level, LiveTaxel, calibration_of
+from ..taxels import Level, LiveTaxel, TaxelCalibration
 from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of
 
 # Codes of joints are bytes, as a CyberGlove's; 0 is a joint without a value. A taxel's whole numbers are its codes;
@@ -212,11 +211,19 @@ class RowSource(Source):
     Without that call, which comes for a build, they must have all joints, and without levels all taxels.
     """
 
-    def __init__(self, reader: RowReader, harness: Harness, number: int, names: Sequence[str], scan: ScanMap) -> None:
+    def __init__(
+        self,
+        reader: RowReader,
+        harness: Harness,
+        number: int,
+        scan: ScanMap,
+        taxels: TaxelCalibration | None = None,
+    ) -> None:
         wiring, read = harness.streams[number], scan.streams[number]
         self.name = f"stream from {wiring.port}"
         self.reader, self.wiring = reader, wiring
-        self.period_us = stream_period_us(wiring)
+        # With the transport of a row on a good line.
+        self.period_us = max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS
         self.longest_us = PERIODS * self.period_us
         wanted = (*wiring.used, *([] if wiring.time is None else [wiring.time]))
         self._columns = Columns(wanted, wiring.columns, wiring.time)
@@ -235,7 +242,7 @@ class RowSource(Source):
         levels: dict[int, list[Level]] = {}
         for place, limit, switch in read.levels:
             levels.setdefault(place, []).append((limit, switch))
-        self._calibration = calibration_of(harness.taxel_settings)
+        self._calibration, self.reads_joints = taxels, bool(wiring.joints)
         self._levels = [levels.get(place, []) for place in range(len(self._taxel_names))]
         self.owned: Mask = sum(bit for *_, bit in self._switches)
         self.owned |= sum(1 << switch for each in self._levels for _, switch in each)
@@ -469,11 +476,6 @@ def steps_of(limits: Range) -> int:
     return int(span) if whole else _TAXEL_STEPS
 
 
-def stream_period_us(wiring: StreamWiring) -> int:
-    """Return the longest expected period of a stream, including the transport of a row on a good line."""
-    return max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS
-
-
 class RowKind(SourceKind, frozen=True):
     """A kind of source that delivers rows.
 
@@ -485,23 +487,16 @@ class RowKind(SourceKind, frozen=True):
     reader: Callable[[StreamWiring], RowReader] | None = None
 
 
-def row_kinds(
+def row_kind(
     name: str, help_: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
-) -> tuple[RowKind, RowKind]:
-    """Return a kind for streams with switches or taxels, and one for those with joints only."""
+) -> RowKind:
+    """Return a kind of source for the streams whose ports it takes."""
 
-    def kind(name: str, *, joints: bool) -> RowKind:
-        def sources(harness: Harness, names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
-            for number, wiring in enumerate(harness.streams):
-                if takes(wiring.port) and joints != bool(wiring.switches or wiring.taxels):
-                    yield RowSource(reader(wiring), harness, number, names, scan)
+    def sources(
+        harness: Harness, _names: Sequence[str], scan: ScanMap, taxels: TaxelCalibration | None
+    ) -> Iterator[Source]:
+        for number, wiring in enumerate(harness.streams):
+            if takes(wiring.port):
+                yield RowSource(reader(wiring), harness, number, scan, taxels)
 
-        def periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-            for wiring, read in zip(harness.streams, scan.streams, strict=True):
-                if takes(wiring.port) and (wiring.joints if joints else read.switches or read.levels):
-                    yield stream_period_us(wiring)
-
-        reads: Literal["joints", "switches"] = "joints" if joints else "switches"
-        return RowKind(name, help_, reads, sources, periods_us, rank, takes, reader)
-
-    return kind(name, joints=False), kind(f"{name} of joints", joints=True)
+    return RowKind(name, help_, sources, rank, takes, reader)
