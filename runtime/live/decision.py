@@ -6,7 +6,7 @@ from ..scores import softmax
 
 
 class Ranking:
-    """The K scores of a frame (2^15 too high); K + 1 if the build refuses frames (`Build.with_none`)."""
+    """The K scores of a frame (2^15 too high); K + 1 if the build refuses frames (`Scorer.with_none`)."""
 
     __slots__ = ("_margin", "_shares", "biased_scores", "candidate")
 
