@@ -30,7 +30,7 @@ class PortReader:
         self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
         self._switches = BitRemap(port.switches)
         self.targets, self.taxel, self.place = self._switches.targets, None, -1
-        wired = harness.chip_of(port.bus, port.chip)
+        wired = harness.wires[port.bus].chips[port.chip]
         if isinstance(wired.chip, Converter | SpiChip):
             channel = [reading.name for reading in wired.chip.readings].index(port.reading)
             name = wired.numbered_pins[channel]
@@ -58,7 +58,7 @@ class PortScanner(Source):
         self.taxels = tuple(port.taxel for port in self._ports if port.taxel is not None)
         self._wire_us = scan_us(ScanMap(SCHEMA, tuple(ports)), harness).us
         self._everything = len(harness.taxel_names)
-        self._every_s, self._due_s, self._held_up = 1.0 / harness.line_of(bus).rate_hz, 0.0, 0
+        self._every_s, self._due_s, self._held_up = 1.0 / harness.wires[bus].rate_hz, 0.0, 0
 
     @property
     def wire_us(self) -> float:
