@@ -18,7 +18,9 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
+from thenar.drivers.calibration import SensorCalibration
 from thenar.runtime.calibration import RAW, Meaning, codes_of_bytes, numbers_of
+from thenar.runtime.code_line import code_line
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import StreamWiring
@@ -29,7 +31,6 @@ from thenar.runtime.recording.guide import FRESH_US
 from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Oddity, Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
-from thenar.runtime.taxels import TaxelLine
 
 from . import TableError, list_rows
 from .bags import is_recording
@@ -430,17 +431,17 @@ def _taxel(
     if (target := codings.get(name)) is not None:
         taxel, line = Joint(name, target.unit, *structs.astuple(_points(target))), None
     elif line is not None:
-        taxel = Joint(name, _taxel_unit(first), line.rest, 0.0, line.press, line.value)
+        taxel = Joint(name, _taxel_unit(first), line.raw_a, line.value_a, line.raw_b, line.value_b)
     coded, codes = BuildCalibration(0, name, taxel.unit, *structs.astuple(_points(taxel))), []
     for part, grasp in grasps:
         count, own = grasp.counts[place], _line(part.session, place)
         assert count is not None
-        code = count if own is None or own == line else own.codes(coded).code(count)
+        code = count if own is None or own == line else code_line(coded, own).code(count)
         codes.append(min(max(code, 0), CODES - 1))
     return codes, taxel
 
 
-def _line(session: Session, place: int) -> TaxelLine | None:
+def _line(session: Session, place: int) -> SensorCalibration | None:
     return None if session.taxel_calibration is None else session.taxel_calibration.line(session.taxels[place])
 
 

@@ -20,8 +20,9 @@ from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.base import Source
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine
+from thenar.runtime.taxels import TaxelCalibration
 
+from ...gloves import pad_line
 from ...sending import datagrams, free_port
 
 MakeBuild = Callable[..., Build]
@@ -340,8 +341,8 @@ def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.Lo
 
 
 def test_devices_know_the_calibration_of_taxels_that_glove_toml_names(tmp_path: Path) -> None:
-    lines = (TaxelLine("pad", rest=50, press=600),)
-    (tmp_path / "taxels.toml").write_text(TaxelCalibration(taxels=lines).to_toml())
+    lines = (pad_line("pad", rest=50, press=600),)
+    (tmp_path / "taxels.toml").write_text(TaxelCalibration(sensors=lines).to_toml())
     text = 'columns = ["pad"]\ntaxels = { pad = [0, 1023] }\n[taxels]\ncalibration = "taxels.toml"\n'
     (tmp_path / "glove.toml").write_text(f'[[stream]]\nport = "udp://127.0.0.1:{(port := free_port())}"\n{text}')
     harness = load_harness(tmp_path / "glove.toml")

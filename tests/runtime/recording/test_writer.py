@@ -30,7 +30,9 @@ from thenar.runtime.recording.mcap import LARGEST_RECORD
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine
+from thenar.runtime.taxels import TaxelCalibration
+
+from ...gloves import pad_line
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label
 Record = Callable[[Recorder, Entry], None]
@@ -361,7 +363,7 @@ def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, sessio
     with Recorder(tmp_path / "plain.mcap", session):
         pass
     assert "/thenar/taxels" not in topics(tmp_path / "plain.mcap")
-    analog = replace(session, taxels=("p", "q"), taxel_calibration=TaxelCalibration(taxels=(TaxelLine("p", 1, 9),)))
+    analog = replace(session, taxels=("p", "q"), taxel_calibration=TaxelCalibration(sensors=(pad_line("p", 1, 9),)))
     path, frames = tmp_path / "a.mcap", [SwitchFrame(time_us, 1, taxels=(time_us, 3)) for time_us in (5, 6)]
     with Recorder(path, analog):
         pass

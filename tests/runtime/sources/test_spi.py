@@ -11,7 +11,9 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources import i2c
 from thenar.runtime.sources.base import slowest_us, sources_of
 from thenar.runtime.sources.spi import SpiConverter
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine
+from thenar.runtime.taxels import TaxelCalibration
+
+from ...gloves import pad_line
 
 HARNESS = Harness(
     name="x",
@@ -70,8 +72,8 @@ def test_where_no_converter_answers_levels_are_lost_and_it_says_so(answers: list
 
 
 def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]]) -> None:
-    lines = tuple(TaxelLine(name, rest=50, press=600) for name in ("t1", "t2"))
-    device = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES), TaxelCalibration(taxels=lines))
+    lines = tuple(pad_line(name, rest=50, press=600) for name in ("t1", "t2"))
+    device = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES), TaxelCalibration(sensors=lines))
     answers.append([1023, 400])
     found = device.read(0.1)
     assert found is not None
