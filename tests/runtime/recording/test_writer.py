@@ -26,7 +26,7 @@ from thenar.runtime.errors import FormatError, FrameError
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.layout import Tail
+from thenar.runtime.recording.layout import CHANNELS, Tail
 from thenar.runtime.recording.mcap import LARGEST_RECORD
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session
@@ -72,9 +72,10 @@ def test_the_mcap_library_reads_it_by_its_summary_and_checks_its_checksums(recor
             "/thenar/grasp": 2,
             "/thenar/recognition": 2,
             "/thenar/trials": 2,
+            "/thenar/taxels": 0,
         }
         numbers = summary.statistics
-        assert (numbers.message_count, numbers.schema_count, numbers.channel_count) == (12, 2, 5)
+        assert (numbers.message_count, numbers.schema_count, numbers.channel_count) == (12, 2, 6)
         assert (numbers.metadata_count, numbers.attachment_count, numbers.chunk_count) == (1, 0, 0)
         [metadata] = reader.iter_metadata()
         assert metadata.name == "thenar"
@@ -352,7 +353,7 @@ def test_a_killed_process_has_recorded_all_that_it_said_it_had(tmp_path: Path, a
     assert len(found) >= said
 
 
-def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, session: Session) -> None:
+def test_taxels_have_a_topic_in_every_recording(tmp_path: Path, session: Session) -> None:
     def topics(path: Path) -> dict[str, int]:
         with path.open("rb") as file:
             summary = make_reader(file, validate_crcs=True).get_summary()
@@ -363,7 +364,7 @@ def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, sessio
 
     with Recorder(tmp_path / "plain.mcap", session):
         pass
-    assert "/thenar/taxels" not in topics(tmp_path / "plain.mcap")
+    assert topics(tmp_path / "plain.mcap") == {topic: 0 for topic, _ in CHANNELS.values()}
     analog = replace(session, taxels=("p", "q"), taxel_calibration=TaxelCalibration(sensors=(pad_line("p", 1, 9),)))
     path, frames = tmp_path / "a.mcap", [SwitchFrame(time_us, 1, taxels=(time_us, 3)) for time_us in (5, 6)]
     with Recorder(path, analog):
