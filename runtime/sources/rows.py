@@ -38,8 +38,13 @@ _SILENT = f"connected, but no row has come for {_NOTICE_US / 1e6:g} s or longer:
 _NO_TIME = "leave out `time` in glove.toml"
 # A serial adapter, or a radio, may hold a row back for this long in normal operation.
 _WAY_US = 20_000
-# Rows that do not count: they come after a later one; their clock is not the one whose rows still come.
-_LATE, _JUMPED = -1, -2
+# By their counts, rows whose clock is wrong.
+_WRONG = {
+    "untimed": "rows come whose clock is missing, or no time, and are left out",
+    "late": "rows come after later ones and are left out: do two programs send?",
+    "jumped": "rows of another clock come and are left out: do two programs send?",
+    "restarts": "its clock has restarted: was the board reset, or does another program send?",
+}
 
 
 class SenderClock:
@@ -53,24 +58,24 @@ class SenderClock:
         self._came_us = self._shown_us = self._until_us = 0
         self._offsets = [0.0, 0.0]
 
-    def host_us(self, sent_us: float, came_us: int) -> int | None:
+    def host_us(self, sent_us: float, came_us: int) -> int | str:
         """Return the time of a row that its sender stamped `sent_us`.
 
-        _LATE if it comes after a later one, _JUMPED if it has another clock than the rows that still come, None if the
-        sender's clock has restarted, and this clock with it.
+        "late" if it comes after a later one, "jumped" if it has another clock than the rows that still come, "restarts"
+        if the sender's clock has restarted, and this clock with it.
         """
         last = self.last_us
         if last is not None:
             step, longest_us = sent_us - last, came_us - self._came_us + _AHEAD_US
             if -_BACK_US < step < 0:
-                return _LATE
+                return "late"
             if 0 <= step + self._turn_us <= longest_us:
                 self._offsets = [offset + self._turn_us for offset in self._offsets]
             elif not 0 <= step <= longest_us:
                 if came_us - self._came_us < SILENCE_US:
-                    return _JUMPED
+                    return "jumped"
                 self.last_us = None
-                return None
+                return "restarts"
         offset = came_us - sent_us
         if last is None or came_us > self._until_us:
             self._offsets = [offset, offset if last is None else self._offsets[0]]
@@ -325,33 +330,30 @@ class RowSource(Source):
 
     def _known_us(self, sent_us: float, came_us: int, values: Sequence[float | None]) -> int | None:
         """Return our time of a row by its sender's clock; None if the row does not count, which is counted."""
-        counts = self.watch.counts
         if not abs(sent_us) <= _LATEST_US:  # nan, too
-            counts.untimed += 1
-            self._report(came_us, "rows come whose clock is missing, or no time, and are left out")
+            self._wrong(came_us, "untimed")
             return None
         if sent_us != self._clock.last_us:
             self._ticked_us = came_us
         elif came_us - self._ticked_us > self.longest_us:
             self._report(came_us, "its clock does not change from row to row, so rows count as old: " + _NO_TIME)
         if (sent_us, values) == self._last:
-            counts.repeated += 1
+            self.watch.counts.repeated += 1
             return None
-        known_us = self._clock.host_us(sent_us, came_us)
-        if known_us is None:
-            counts.restarts += 1
-            self._report(came_us, "its clock has restarted: was the board reset, or does another program send?")
+        found = self._clock.host_us(sent_us, came_us)
+        if found == "restarts":
+            self._wrong(came_us, found)
             self.watch.begin()
-            known_us = self._clock.host_us(sent_us, came_us)
-        if known_us == _LATE:
-            counts.late += 1
-            self._report(came_us, "rows come after later ones and are left out: do two programs send?")
-            return None
-        if known_us == _JUMPED:
-            counts.jumped += 1
-            self._report(came_us, "rows of another clock come and are left out: do two programs send?")
-            return None
-        return known_us
+            found = self._clock.host_us(sent_us, came_us)
+        if isinstance(found, int):
+            return found
+        self._wrong(came_us, found)
+        return None
+
+    def _wrong(self, came_us: int, what: str) -> None:
+        """Count a row whose clock is wrong, and report that."""
+        setattr(self.watch.counts, what, getattr(self.watch.counts, what) + 1)
+        self._report(came_us, _WRONG[what])
 
     def _report(self, came_us: int, fault: str) -> None:
         self._fault, self._fault_until_us = fault, came_us + _NOTICE_US

@@ -163,7 +163,7 @@ def test_no_frame_is_of_the_future_and_none_goes_back(steps: list[tuple[int, int
     for wait_ms, sent in steps:
         came_us += 1000 * wait_ms
         time_us = clock.host_us(float(sent), came_us)
-        if time_us is not None and time_us not in (module._LATE, module._JUMPED):
+        if isinstance(time_us, int):
             assert shown[-1] <= time_us <= came_us
             shown.append(time_us)
 
