@@ -52,4 +52,4 @@ def _sources(_harness: Harness, *_: object) -> Iterator[Source]:
     yield FlexSensors(int(os.environ.get("FLEX_PORT", "9000")))
 
 
-MEMBER = SourceKind("flex", "Flex sensors, by UDP: FLEX_PORT.", _sources, rank=9)
+MEMBER = SourceKind("flex", _sources, rank=9)

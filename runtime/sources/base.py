@@ -109,9 +109,7 @@ class SourceKind(Struct, frozen=True):
     Attributes
     ----------
     name : str
-        Its name for users: "cyberglove".
-    help : str
-        A sentence on the devices that it reads.
+        Its name: "cyberglove".
     sources : callable
         `sources(harness, switch_names, scan, taxels)` yields a `Source` for each device, without opening anything: a
         replay calls it, too. Switch k of the frames is `switch_names[k]`; `scan` gives the ports to read, in order, and
@@ -122,7 +120,6 @@ class SourceKind(Struct, frozen=True):
     """
 
     name: str
-    help: str
     sources: Callable[[Harness, Sequence[str], ScanMap, TaxelCalibration | None], Iterable[Source]]
     rank: int = 0
 

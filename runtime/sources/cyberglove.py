@@ -95,4 +95,4 @@ def _sources(harness: Harness, *_: object) -> Iterator[Source]:
         yield GloveDevice(harness.cyberglove)
 
 
-MEMBER = SourceKind("cyberglove", "A CyberGlove on a serial line: [cyberglove].", _sources, rank=2)
+MEMBER = SourceKind("cyberglove", _sources, rank=2)

@@ -163,4 +163,4 @@ def _sources(
     return (I2cDevice(harness, bus, scan, taxels) for bus in buses)
 
 
-MEMBER = SourceKind("i2c", "Port expanders and converters on an I2C bus: [[bus]].", _sources, rank=1)
+MEMBER = SourceKind("i2c", _sources, rank=1)

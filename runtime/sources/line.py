@@ -7,7 +7,6 @@ from .rows import row_kind
 
 MEMBER = row_kind(
     "line",
-    "Lines or frames of numbers over serial, TCP, UDP, Bluetooth or stdin: [[stream]].",
     lambda port: not port.startswith(OTHER_PORTS),
     lambda wiring: LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.frame),
     3,

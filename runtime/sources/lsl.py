@@ -77,7 +77,6 @@ class LslReader(RowReader):
 
 MEMBER = row_kind(
     "lsl",
-    "A stream of the Lab Streaming Layer: [[stream]] from lsl:NAME.",
     lambda port: port.startswith("lsl:"),
     lambda wiring: LslReader(wiring.port),
     4,

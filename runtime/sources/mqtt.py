@@ -127,7 +127,6 @@ class MqttReader(LineReader):
 
 MEMBER = row_kind(
     "mqtt",
-    "Messages of an MQTT topic: [[stream]] from mqtt:HOST:PORT/TOPIC.",
     lambda port: port.startswith("mqtt:"),
     lambda wiring: MqttReader(wiring.port, columns=len(wiring.columns)),
     6,

@@ -84,7 +84,6 @@ class OscReader(LineReader):
 
 MEMBER = row_kind(
     "osc",
-    "Messages of Open Sound Control: [[stream]] from osc:HOST:PORT/ADDRESS.",
     lambda port: port.startswith("osc:"),
     lambda wiring: OscReader(wiring.port),
     7,

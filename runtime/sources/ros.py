@@ -127,7 +127,6 @@ class RosReader(RowReader):
 
 MEMBER = row_kind(
     "ros",
-    "A topic of ROS 2, JointState, UInt8MultiArray or Float32MultiArray: [[stream]] from ros:/TOPIC.",
     lambda port: port.startswith("ros:"),
     lambda wiring: RosReader(wiring.port),
     5,

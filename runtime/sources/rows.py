@@ -490,7 +490,7 @@ class RowKind(SourceKind, frozen=True):
 
 
 def row_kind(
-    name: str, help_: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
+    name: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
 ) -> RowKind:
     """Return a kind of source for the streams whose ports it takes."""
 
@@ -501,4 +501,4 @@ def row_kind(
             if takes(wiring.port):
                 yield RowSource(reader(wiring), harness, number, scan, taxels)
 
-    return RowKind(name, help_, sources, rank, takes, reader)
+    return RowKind(name, sources, rank, takes, reader)

@@ -63,4 +63,4 @@ def _sources(
     return (SpiConverter(harness, number, scan, taxels) for number in numbers)
 
 
-MEMBER = SourceKind("spi", "Converters on SPI: [[spi]].", _sources, rank=2)
+MEMBER = SourceKind("spi", _sources, rank=2)
