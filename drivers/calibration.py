@@ -75,10 +75,6 @@ class SensorLines(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
                 raise SettingError(f"sensor {sensor.name!r} is calibrated twice: keep one")
             seen.add(sensor.name)
 
-    def line(self, name: str) -> SensorCalibration | None:
-        """Return the line of a sensor, or None if it was not calibrated."""
-        return next((sensor for sensor in self.sensors if sensor.name == name), None)
-
     def to_toml(self) -> str:
         """Return the text of the calibration file; numbers keep every digit."""
         return msgspec.toml.encode(self).decode("utf-8")

@@ -59,6 +59,10 @@ class TaxelCalibration(SensorLines, frozen=True, kw_only=True):
     unit: str = "press"
     sensors: tuple[TaxelLine, ...]
 
+    def line(self, name: str) -> TaxelLine | None:
+        """Return the line of a taxel, or None if it was not calibrated."""
+        return next((line for line in self.sensors if line.name == name), None)
+
 
 class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
     """`[taxels]` of glove.toml.

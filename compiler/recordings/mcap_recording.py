@@ -18,7 +18,6 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from thenar.drivers.calibration import SensorCalibration
 from thenar.runtime.calibration import RAW, Meaning, codes_of_bytes, numbers_of
 from thenar.runtime.code_line import code_line
 from thenar.runtime.frames import GloveFrame, SwitchFrame
@@ -31,6 +30,7 @@ from thenar.runtime.recording.guide import FRESH_US
 from thenar.runtime.recording.layout import switch_matrix
 from thenar.runtime.recording.reader import Oddity, Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
+from thenar.runtime.taxels import TaxelLine
 
 from . import TableError, list_rows
 from .bags import is_recording
@@ -441,7 +441,7 @@ def _taxel(
     return codes, taxel
 
 
-def _line(session: Session, place: int) -> SensorCalibration | None:
+def _line(session: Session, place: int) -> TaxelLine | None:
     return None if session.taxel_calibration is None else session.taxel_calibration.line(session.taxels[place])
 
 
