@@ -51,7 +51,7 @@ from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.sources import FrameBuffer
 from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.base import SOURCES
+from thenar.runtime.sources.base import sources_of
 
 MOST_US, REST_US, ROW_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 60, 25, 200, 0.9, 45, 20
 FRAMES, TURNS = 500, 8
@@ -147,7 +147,7 @@ def row_us(scene: Played, folder: Path) -> tuple[float, float]:
         "rows",
     )
     scan = whole_scan(harness, scene.kept)
-    (source,) = (source for kind in SOURCES.values() for source in kind.sources(harness, scene.kept, scan))
+    (source,) = sources_of(harness, scene.kept, scan)
     buffer = FrameBuffer(len(scene.kept), [source.owned])
     draw = np.random.default_rng(1)
     rows = np.hstack([draw.integers(0, 2, (ROWS, len(switches))), draw.integers(0, 1024, (ROWS, len(joints)))])

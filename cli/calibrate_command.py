@@ -100,7 +100,7 @@ def command(
             pressed = lead_presses(Path(port), hold, partial(_ask_press, typed), Event(), wearer, newtons)
             assert pressed is not None
             names, pads = pressed
-            said = _written(output, "taxel", [line.name for line in pads.taxels], names, pads)
+            said = _written(output, "taxel", [line.name for line in pads.sensors], names, pads)
             echo(f"{said}; name it under [taxels] of {Path(port).name}")
             return
         guide = lead_poses(port, baud, hold, _asking_poses(typed), Event(), partial(echo, err=True))

@@ -165,12 +165,13 @@ def _scan(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> 
     if scan is not None and harness is not None:
         if scan.ports:
             time = scan_us(scan, harness)
+            wired = sum(len(chip.pins) for chip in harness.chips)
             muxes = f" ({counted(time.selects, 'write')} to muxes)" if time.selects else ""
             yield Fact(
                 "scan",
                 "a whole scan",
                 f"{counted(len(scan.ports) + time.selects, 'transaction')}{muxes}, {time.us:.1f} µs on the wire, "
-                f"{percent(time.share)} of the {time.full_us:.1f} µs for all {harness.on_chips} wired "
+                f"{percent(time.share)} of the {time.full_us:.1f} µs for all {wired} wired "
                 f"{'sensors' if harness.taxel_names else 'switches'}",
             )
         for stream, read in zip(harness.streams, scan.streams, strict=True):

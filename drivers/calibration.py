@@ -1,4 +1,4 @@
-"""The calibration of a CyberGlove on one hand: two points of each sensor's straight line, in a TOML file.
+"""The calibration of a glove on one hand: two points of each sensor's straight line, in a TOML file.
 
     subject = "anna"
     unit = "deg"
@@ -33,9 +33,10 @@ _FINGERS = ("index", "middle", "ring", "little")
 
 
 class SensorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The straight line of one sensor: raw byte (1 to 255) and value at each of two points.
+    """The straight line of one sensor: what it reads (a CyberGlove's: a byte, 1 to 255) and the value at each of two
+    points.
 
-    Raises SettingError if the two points share a byte or a value is not a number.
+    Raises SettingError if the two points share a reading or a value is not a number.
     """
 
     name: Name
@@ -53,22 +54,21 @@ class SensorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
             raise SettingError(f"{self.name!r}: value_a and value_b must be finite numbers")
 
     def value(self, raw: float) -> float:
-        """Return the value at a raw byte."""
+        """Return the value of a reading."""
         return self.value_a + (raw - self.raw_a) * ((self.value_b - self.value_a) / (self.raw_b - self.raw_a))
 
 
-class GloveCalibration(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, rename={"sensors": "sensor"}
-):
-    """The lines of a glove's sensors, each named once, in any order. Raises SettingError if one is named twice."""
+class SensorLines(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, rename={"sensors": "sensor"}):
+    """The lines of sensors, each named once, in any order. Raises SettingError if one is named twice."""
 
     subject: str = ""
-    unit: Literal["deg"] = "deg"
+    unit: str
     sensors: tuple[SensorCalibration, ...]
 
     def __post_init__(self) -> None:
-        if self.subject and (reason := fault(self.subject)):
-            raise SettingError(f"subject {shortened(repr(self.subject))} {reason}")
+        for what, name in (("subject", self.subject), ("unit", self.unit)):
+            if (name or what == "unit") and (reason := fault(name)):
+                raise SettingError(f"{what} {shortened(repr(name))} {reason}")
         seen: set[str] = set()
         for sensor in self.sensors:
             if sensor.name in seen:
@@ -78,6 +78,12 @@ class GloveCalibration(
     def to_toml(self) -> str:
         """Return the text of the calibration file; numbers keep every digit."""
         return msgspec.toml.encode(self).decode("utf-8")
+
+
+class GloveCalibration(SensorLines, frozen=True, kw_only=True):
+    """The lines of a CyberGlove's sensors."""
+
+    unit: Literal["deg"] = "deg"
 
 
 class CalibrationPose(msgspec.Struct, frozen=True):

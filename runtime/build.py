@@ -1,6 +1,5 @@
 """A loaded build folder: `build.json` describes the tables, `tables.bin` holds them."""
 
-from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Self
 
@@ -11,13 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from . import manifest_file
 from .errors import BuildError
 from .files import read_file
-from .frames import Mask
 from .manifest import Manifest
 from .manifest_file import manifest_from_bytes
 from .model import integers as tables_file
 from .model.integers import IntegerTables, tables_from_bytes
 from .published import NONE
-from .scores import LANE_OFFSET, Rejector, Scorer, none_leads, softmax
+from .scores import LANE_OFFSET, Scorer, softmax
 from .sealed import sha256
 
 if TYPE_CHECKING:
@@ -73,11 +71,9 @@ class Build:
         self.manifest = manifest
         self.tables = tables
         self.grasps, self.classes = manifest.grasps, manifest.classes
-        self.scorer = Scorer(tables)
+        self.scorer = Scorer(tables, manifest.rejection)
+        self.rejector, self.none_leads = self.scorer.rejector, self.scorer.none_leads
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
-        refusal = manifest.rejection
-        self.rejector = None if refusal is None else Rejector(refusal)
-        self.none_leads = (0, 0) if refusal is None else none_leads(refusal, tables.scale)
 
     @classmethod
     def load(cls, folder: str | PathLike[str]) -> Self:
@@ -107,20 +103,9 @@ class Build:
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
-        switches, values = self.scorer.frame(bits, codes)
-        scores, _ = self.with_none(self.scorer.frame_scores(switches, values), sum(switches), 0, values)
+        closed, values = self.scorer.frame(bits, codes)
+        scores, _ = self.scorer.with_none(self.scorer.state_scores(closed, 0, values), closed, 0, values, 0)
         return self.classes[scores.index(max(scores))]
-
-    def with_none(
-        self, biased_scores: tuple[int, ...], closed: int, lost: int, codes: Sequence[int] | None, lost_joints: Mask = 0
-    ) -> tuple[tuple[int, ...], bool]:
-        """Return the scores of all classes, with one for none if the build may refuse a frame, and whether it refuses
-        this one: the arguments are those of `Rejector.refuses`.
-        """
-        if self.rejector is None:
-            return biased_scores, False
-        refused = self.rejector.refuses(biased_scores, closed, lost, codes, lost_joints=lost_joints)
-        return (*biased_scores, max(biased_scores) + self.none_leads[refused]), refused
 
     def recognise(
         self,
@@ -147,22 +132,14 @@ class Build:
         FrameError
             If the frame does not fit the build.
         """
-        scorer, degraded = self.scorer, False
-        switches, values = scorer.frame(bits, codes)
-        if lost_switches is None and lost_joints is None:
-            biased_scores, _ = self.with_none(scorer.frame_scores(switches, values), sum(switches), 0, values)
-        else:
-            lost = np.zeros(self.tables.n_switches, bool) if lost_switches is None else np.asarray(lost_switches)
-            joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else np.asarray(lost_joints)
-            biased_scores = scorer.biased_scores_without(bits, codes, lost, joints)
-            degraded = bool(np.any(lost) or np.any(joints))
-            closed, gone = int(np.count_nonzero(switches & ~lost.astype(bool))), int(np.count_nonzero(lost))
-            mask = sum(1 << joint for joint in np.flatnonzero(joints).tolist())
-            biased_scores, _ = self.with_none(biased_scores, closed, gone, values, mask)
+        closed, values = self.scorer.frame(bits, codes)
+        lost, absent = self.scorer.losses(lost_switches, lost_joints)
+        state = closed, lost, values, absent
+        biased_scores, _ = self.scorer.with_none(self.scorer.state_scores(*state), *state)
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
         probability = softmax(biased_scores, self.tables.scale)[winner]
-        return Recognition(self.classes[winner], probability, best - second, degraded)
+        return Recognition(self.classes[winner], probability, best - second, bool(lost or absent))
 
 
 def load_manifest(folder: "Path") -> Manifest:

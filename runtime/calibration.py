@@ -12,9 +12,9 @@ code that a recorded one got.
 import math
 from collections.abc import Mapping, Sequence
 from operator import getitem
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration, SensorLines
 from thenar.drivers.errors import SettingError
 
 from .code_line import code_line
@@ -27,6 +27,7 @@ from .published import JointAngles
 if TYPE_CHECKING:
     from pathlib import Path
 
+L = TypeVar("L", bound=SensorLines)
 _BYTES = 256
 # The unit of recorded bytes that are not calibrated.
 RAW = "raw"
@@ -34,13 +35,18 @@ RAW = "raw"
 _RAW_CODES = range(1, _BYTES)
 
 
-def load_calibration(path: "Path") -> GloveCalibration:
+def load_lines(path: "Path", kind: type[L]) -> L:
     """Return the calibration written by `thenar calibrate`. Raises SettingError with file, line and key."""
     from .toml_source import read_source  # not every glove is calibrated
     from .toml_struct import convert
 
     source = read_source(path, SettingError)
-    return convert(source, (), source.tables(), GloveCalibration)
+    return convert(source, (), source.tables(), kind)
+
+
+def load_calibration(path: "Path") -> GloveCalibration:
+    """Return the calibration of a CyberGlove. Raises as `load_lines`."""
+    return load_lines(path, GloveCalibration)
 
 
 # The meaning of the bytes of joints: by a calibration, or, of an uncalibrated stream, by the lines of the numbers that
@@ -191,6 +197,5 @@ def codes_of_bytes(joint: Calibration, calibration: Meaning) -> tuple[int, ...]:
     lines = {line.name: line for line in sensors}
     if joint.name not in lines:
         raise SettingError(f"the calibration has no sensor {joint.name!r}: calibrate the glove again")
-    sensor = lines[joint.name]
-    line = code_line(joint, (sensor.raw_a, sensor.value_a), (sensor.raw_b, sensor.value_b))
+    line = code_line(joint, lines[joint.name])
     return tuple(map(line.code, range(_BYTES)))

@@ -8,6 +8,7 @@ from math import isfinite
 
 from msgspec import Struct
 
+from thenar.drivers.calibration import SensorCalibration
 from thenar.drivers.errors import SettingError
 
 from .manifest import Calibration
@@ -65,6 +66,7 @@ def code_point(coded: Calibration, value: float) -> int:
     return round(code * (1 << FRACTION))
 
 
-def code_line(coded: Calibration, a: tuple[int, float], b: tuple[int, float]) -> CodeLine:
-    """Return the line through two readings and their values, in the unit of the build. Raises SettingError."""
-    return CodeLine((a[0], code_point(coded, a[1])), (b[0], code_point(coded, b[1])))
+def code_line(coded: Calibration, line: SensorCalibration) -> CodeLine:
+    """Return the line from a sensor's readings to the codes of a build. Raises SettingError if none exists."""
+    a, b = (code_point(coded, value) for value in (line.value_a, line.value_b))
+    return CodeLine((line.raw_a, a), (line.raw_b, b))

@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 
 from .names import list_names
 from .published import NONE
-from .recipe import AUTO, PAPERS_TRAINER, Count, Name, Recipe, Share, Value
+from .recipe import AUTO, PAPERS_TRAINER, Count, Name, Positive, Recipe, Share, Value
 from .segmenting.model import SegmentModel
 
 SCHEMA = 1
@@ -58,7 +58,7 @@ class Compared(Struct, frozen=True, forbid_unknown_fields=True):
     trainer: Name
     settings: dict[Name, Value | None]
     correct: Count
-    total: Annotated[int, Meta(ge=1, le=2**53)]
+    total: Positive
     error: Share
     loss: Annotated[float, Meta(ge=0.0)]
     behind: Share
@@ -206,7 +206,7 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
     folds: Count
     seed: int
     correct: Count
-    total: Annotated[int, Meta(ge=1, le=2**53)]
+    total: Positive
     of: Of = "pooled"
     unit: Unit = "frames"
     low: Share | None = None
@@ -285,7 +285,7 @@ class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     pair   two inputs lost; None for one input, and for so large a number that pairs were not evaluated
     """
 
-    total: Annotated[int, Meta(ge=1, le=2**53)]
+    total: Positive
     correct: Count
     lost: Faulty | None = None
     stuck: Faulty | None = None

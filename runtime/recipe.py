@@ -16,6 +16,7 @@ Inputs = Literal["both", "switches", "joints"]
 TableBits = Literal[16, 8]
 By = Literal["trial", "subject", "object", "session"]
 Count = Annotated[int, Meta(ge=0, le=2**53)]
+Positive = Annotated[int, Meta(ge=1, le=2**53)]
 Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Name = Annotated[str, Meta(min_length=1)]
@@ -49,9 +50,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
         Count,
         _choice("placement", "Prune ID3's tree: nodes with fewer than S rows are not split.", metavar="S"),
     ] = _written(0)
-    rounds: Annotated[Annotated[int, Meta(ge=1, le=2**53)] | None, _choice("training", "Rounds of boosting.")] = (
-        _written(None)
-    )
+    rounds: Annotated[Positive | None, _choice("training", "Rounds of boosting.")] = _written(None)
     inputs: Annotated[Inputs, _choice("placement", "Inputs that the build reads.")] = _written("both")
     shrinkage: Annotated[
         Annotated[float, Meta(gt=0.0, le=1.0)] | None, _choice("training", "Share of each round that is kept.")
@@ -73,7 +72,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
         Name, _choice("placement", "How switches are chosen: see below.", option="method", metavar="NAME")
     ] = "id3"
     keep: Annotated[
-        Annotated[int, Meta(ge=1, le=2**53)] | None,
+        Positive | None,
         _choice("placement", "Number of switches to keep, for methods that take it.", metavar="M"),
     ] = None
     width: Annotated[Annotated[int, Meta(ge=4, le=16)], _choice("tables", "Bits that every sum of scores fits.")] = 16
@@ -92,7 +91,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
         _choice("placement", "Choose from L levels of each taxel.", metavar="L", default="7"),
     ] = None
     keep_joints: Annotated[
-        Annotated[int, Meta(ge=1, le=2**53)] | None,
+        Positive | None,
         _choice("placement", "Keep the best N joints.", metavar="N", default="all"),
     ] = None
     robust: Annotated[
@@ -120,7 +119,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
         ),
     ] = None
     sensors: Annotated[
-        Annotated[int, Meta(ge=1, le=2**53)] | None,
+        Positive | None,
         _choice("placement", "Keep the best N sensors: switches, pads and joints in one pool.", metavar="N"),
     ] = None
     price: Annotated[

@@ -48,10 +48,14 @@ class Scorer:
     joints_lost                 the contribution of all joints while they are lost
     size, unpack                for a sum that began with `start`: its bytes, and the function that makes K scores of
                                 them, each 2^15 too high
+    rejector                    decides which frames are refused, None if none is
+    none_leads                  the leads of none for a frame that is not refused and for one that is
     """
 
-    def __init__(self, tables: IntegerTables) -> None:
+    def __init__(self, tables: IntegerTables, rejection: Rejection | None = None) -> None:
         self.tables = tables
+        self.rejector = None if rejection is None else Rejector(rejection)
+        self.none_leads = (0, 0) if rejection is None else none_leads(rejection, tables.scale)
         lanes = Struct(f"<{tables.n_classes}H")
         self.size, self.unpack = lanes.size, lanes.unpack
         offsets = _packed(np.zeros((1, tables.n_classes), np.int16), 0)[0]
@@ -86,16 +90,25 @@ class Scorer:
 
     def biased_scores(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame, each 2^15 too high: K integers. Raises FrameError."""
-        return self.frame_scores(*self.frame(bits, codes))
+        closed, values = self.frame(bits, codes)
+        return self.state_scores(closed, 0, values)
 
-    def frame(self, bits: ArrayLike, codes: ArrayLike) -> tuple[list[bool], list[int]]:
-        """Return the switches and the codes of one frame as lists. Raises FrameError."""
-        return _flags(bits, len(self.switch_rows), "switches"), self._codes(codes)
+    def biased_scores_without(
+        self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
+    ) -> tuple[int, ...]:
+        """Return `biased_scores`, with the mean row for every switch and joint that the masks mark as lost."""
+        closed, values = self.frame(bits, codes)
+        lost, absent = self.losses(lost_switches, lost_joints)
+        return self.state_scores(closed, lost, values, absent)
 
-    def frame_scores(self, switches: Sequence[bool], codes: Sequence[int]) -> tuple[int, ...]:
-        """Return `biased_scores` of the lists that `frame` returns."""
-        total = sum(compress(self.switch_rows, switches), self.start) + self.joint_sum(codes)
-        return self.unpack(total.to_bytes(self.size, "little"))
+    def frame(self, bits: ArrayLike, codes: ArrayLike) -> tuple[Mask, list[int]]:
+        """Return the closed switches and the codes of one frame. Raises FrameError."""
+        return _mask(bits, len(self.switch_rows), "switches"), self._codes(codes)
+
+    def losses(self, lost_switches: ArrayLike | None, lost_joints: ArrayLike | None) -> tuple[Mask, Mask]:
+        """Return the lost switches and joints of one frame; None: none is. Raises FrameError."""
+        switches = 0 if lost_switches is None else _mask(lost_switches, len(self.switch_rows), "lost switches")
+        return switches, 0 if lost_joints is None else _mask(lost_joints, len(self.thresholds), "lost joints")
 
     def joint_sum(self, codes: Sequence[int], lost: Mask = 0) -> int:
         """Return the sum of the contributions of all joints' codes, with the mean for lost ones."""
@@ -113,18 +126,6 @@ class Scorer:
             total += rows[bisect_left(steps, codes[one])][bisect_left(more, codes[other])]
         return total
 
-    def biased_scores_without(
-        self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
-    ) -> tuple[int, ...]:
-        """Return `biased_scores`, with the mean row for every switch and joint that the masks mark as lost."""
-        switches, joints = _flags(bits, len(self.switch_rows), "switches"), self._codes(codes)
-        lost_bits = _flags(lost_switches, len(self.switch_rows), "lost switches")
-        lost_codes = _flags(lost_joints, len(self.thresholds), "lost joints")
-        there = [bit and not lost for bit, lost in zip(switches, lost_bits, strict=True)]
-        total = sum(compress(self.switch_rows, there), sum(compress(self.switch_means, lost_bits), self.start))
-        total += self.joint_sum(joints, sum(lost << joint for joint, lost in enumerate(lost_codes)))
-        return self.unpack(total.to_bytes(self.size, "little"))
-
     def state_scores(
         self, closed: Mask, lost: Mask, codes: Sequence[int] | None, lost_joints: Mask = 0
     ) -> tuple[int, ...]:
@@ -140,6 +141,18 @@ class Scorer:
             total += _sum(lost, self.mean_sums)
         total += self.joints_lost if codes is None else self.joint_sum(codes, lost_joints)
         return self.unpack(total.to_bytes(self.size, "little"))
+
+    def with_none(
+        self, biased_scores: tuple[int, ...], closed: Mask, lost: Mask, codes: Sequence[int] | None, lost_joints: Mask
+    ) -> tuple[tuple[int, ...], bool]:
+        """Return the scores of all classes, given those of a state: with one for none if the build may refuse a frame;
+        and whether it refuses this one.
+        """
+        if self.rejector is None:
+            return biased_scores, False
+        seen, gone = (closed & ~lost).bit_count(), lost.bit_count()
+        refused = self.rejector.refuses(biased_scores, seen, gone, codes, lost_joints=lost_joints)
+        return (*biased_scores, max(biased_scores) + self.none_leads[refused]), refused
 
     def _codes(self, codes: ArrayLike) -> list[int]:
         array = np.asarray(codes)
@@ -277,11 +290,12 @@ def _sum(switches: Mask, sums: Sequence[Sequence[int]]) -> int:
     return sum(map(getitem, sums, switches.to_bytes(len(sums), "little")))
 
 
-def _flags(flags: ArrayLike, expected: int, what: str) -> list[bool]:
+def _mask(flags: ArrayLike, expected: int, what: str) -> Mask:
     array = np.asarray(flags)
     if array.shape != (expected,):
         raise FrameError(f"a frame has {what} of shape {array.shape}, but the build has {expected}")
-    values: list[bool] = array.tolist()
-    if array.dtype != np.bool_ and any(value not in (0, 1) for value in values):
-        raise FrameError(f"{what} must be 0 or 1, but this frame has {next(v for v in values if v not in (0, 1))!r}")
-    return values
+    if array.dtype != np.bool_:
+        if wrong := [value for value in array.tolist() if value not in (0, 1)]:
+            raise FrameError(f"{what} must be 0 or 1, but this frame has {wrong[0]!r}")
+        array = array.astype(bool)
+    return int.from_bytes(np.packbits(array, bitorder="little"), "little")

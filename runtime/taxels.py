@@ -8,23 +8,19 @@ are compared, and a level is decided as in the recordings.
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
-import msgspec
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
+from thenar.drivers.calibration import SensorCalibration, SensorLines
 from thenar.drivers.errors import SettingError
 
-from .code_line import CodeLine, code_line
+from .calibration import load_lines
+from .code_line import code_line
 from .frames import Mask
 from .manifest import Calibration, Switch, Threshold
-from .names import fault, list_names, shortened
 from .scanning.scanmap import ScanMap, StreamLevel
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 COUNTS = 65536
 Raw = Annotated[int, Meta(ge=0, lt=COUNTS)]
@@ -42,56 +38,30 @@ _BELOW_REST, _ABOVE_PRESS = 0.35, 0.1
 _END_SHIFT = 9
 
 
-class TaxelLine(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The straight line of one taxel: its counts at rest mean 0, and those of a press mean `value`.
+class TaxelLine(SensorCalibration, frozen=True):
+    """The straight line of one taxel, from its counts at rest, `raw_a`, to those of a press.
 
-    Raises SettingError if both are the same count, or if no press can have the value.
+    Raises SettingError if a press has the value of rest.
     """
 
-    name: Annotated[str, Meta(min_length=1)]
-    rest: Raw
-    press: Raw
-    value: float = 1.0
+    raw_a: Raw
+    raw_b: Raw
 
     def __post_init__(self) -> None:
-        if reason := fault(self.name):
-            raise SettingError(f"taxel {shortened(repr(self.name))} {reason}")
-        if self.rest == self.press:
-            raise SettingError(f"{self.name!r}: rest and press are both {self.rest} counts: calibrate it again")
-        if not (isfinite(self.value) and 1e-9 <= self.value <= 1e9):
-            raise SettingError(f"{self.name!r}: the value of a press must be a number above 0, not {self.value}")
-
-    def codes(self, coded: Calibration) -> CodeLine:
-        """Return the line from counts to the codes of a build. Raises SettingError if none exists."""
-        return code_line(coded, (self.rest, 0.0), (self.press, self.value))
+        super().__post_init__()
+        if self.value_a == self.value_b:
+            raise SettingError(f"{self.name!r}: rest and press have one value: calibrate it again")
 
 
-class TaxelCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, rename={"taxels": "taxel"}):
-    """The lines of a glove's taxels, each named once, in any order, and the unit of their values.
+class TaxelCalibration(SensorLines, frozen=True, kw_only=True):
+    """The lines of a glove's taxels. In the unit "press", 1 is the press of the calibration, whatever its force."""
 
-    In the unit "press", 1 is the press of the calibration, whatever its force. Raises SettingError if a taxel is named
-    twice.
-    """
-
-    subject: str = ""
     unit: str = "press"
-    taxels: tuple[TaxelLine, ...]
-
-    def __post_init__(self) -> None:
-        for what, name in (("subject", self.subject), ("unit", self.unit)):
-            if (name or what == "unit") and (reason := fault(name)):
-                raise SettingError(f"{what} {shortened(repr(name))} {reason}")
-        names = [line.name for line in self.taxels]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise SettingError(f"calibrated twice: {list_names(twice)}: keep one of each")
+    sensors: tuple[TaxelLine, ...]
 
     def line(self, name: str) -> TaxelLine | None:
         """Return the line of a taxel, or None if it was not calibrated."""
-        return next((line for line in self.taxels if line.name == name), None)
-
-    def to_toml(self) -> str:
-        """Return the calibration as the text of its file."""
-        return msgspec.toml.encode(self).decode("utf-8")
+        return next((line for line in self.sensors if line.name == name), None)
 
 
 class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
@@ -107,19 +77,10 @@ class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
 
 def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
-    """Return the calibration that the settings name, or None. Raises as `load_taxel_calibration`."""
+    """Return the calibration that the settings name, or None. Raises as `load_lines`."""
     from pathlib import Path
 
-    return None if settings.calibration is None else load_taxel_calibration(Path(settings.calibration))
-
-
-def load_taxel_calibration(path: "Path") -> TaxelCalibration:
-    """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
-    from .toml_source import read_source  # not every glove has taxels
-    from .toml_struct import convert
-
-    source = read_source(path, SettingError)
-    return convert(source, (), source.tables(), TaxelCalibration)
+    return None if settings.calibration is None else load_lines(Path(settings.calibration), TaxelCalibration)
 
 
 def learnt_lines(
@@ -142,7 +103,7 @@ def learnt_lines(
         held = (median_low(moved[at : at + _IN_A_ROW]) for at in range(len(moved) - _IN_A_ROW + 1))
         press = max(held, key=lambda count: abs(count - rest))
         if abs(press - rest) >= max(_LEAST_TRAVEL, 3 * (max(counts) - min(counts))):
-            lines.append(TaxelLine(name, rest, press, value))
+            lines.append(TaxelLine(name, rest, 0.0, press, value))
     return tuple(lines)
 
 
@@ -164,8 +125,9 @@ def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> i
             f"taxels are calibrated in {calibration.unit!r}, but {coded.name!r} of the build is in {coded.unit!r}: "
             "compile recordings in the calibration's unit"
         )
-    rising = (coded.code_b > coded.code_a) == ((coded.value_b > coded.value_a) == (line.press > line.rest))
-    codes = line.codes(coded)
+    codes = code_line(coded, line)
+    (one, low), (other, high) = codes.a, codes.b
+    rising = (other > one) == (high > low)
     first = bisect_left(range(COUNTS), True, key=lambda raw: (codes.code(raw) > threshold.code) == rising)
     if not rising:
         return ~first
@@ -244,16 +206,13 @@ class LiveTaxel:
         return sum(bit for limit, bit in self._levels if (count if limit >= 0 else ~count) > limit), 0
 
 
-def _ends(line: TaxelLine | None, highest: int | None) -> tuple[int, int, TaxelFault, TaxelFault]:
+def _ends(line: SensorCalibration | None, highest: int | None) -> tuple[int, int, TaxelFault, TaxelFault]:
     """Return the count at and below which, and the one at and above which, a taxel has a fault, and the faults."""
     if line is None or highest is None:
         return -1, COUNTS, "", ""
-    span, margin, rising = abs(line.press - line.rest), highest >> _END_SHIFT, line.press > line.rest
+    (rest, press), margin = (line.raw_a, line.raw_b), highest >> _END_SHIFT
+    span, rising = abs(press - rest), press > rest
     below_rest, above_press = round(span * _BELOW_REST), round(span * _ABOVE_PRESS)
-    least, most = (
-        (line.rest - below_rest, line.press + above_press)
-        if rising
-        else (line.press - above_press, line.rest + below_rest)
-    )
+    least, most = (rest - below_rest, press + above_press) if rising else (press - above_press, rest + below_rest)
     low, high = margin if least > margin else -1, highest - margin if most < highest - margin else COUNTS
     return (low, high, "open wire", "saturated") if rising else (low, high, "saturated", "open wire")

@@ -4,12 +4,12 @@ import codecs
 import math
 import re
 import tomllib
-from collections import Counter
-from collections.abc import Iterator
+from bisect import bisect_left
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from msgspec import Struct, field
+from msgspec import Struct
 
 from .errors import ThenarError
 from .files import read_file
@@ -30,6 +30,8 @@ _LONGEST_NUMBER = 1000
 
 # A place in a file: keys, and list indices from 0.
 Place = tuple[str | int, ...]
+
+_CLOSING = {"[": "]", "{": "}"}
 
 # Every quantifier is possessive: an unclosed text is scanned once, not tried again from every quote in it.
 _TOKEN = re.compile(
@@ -75,9 +77,13 @@ class TomlText(Struct, frozen=True):
         return self.raises(f"{self.name}, line {self.line(place)}: {where}{shown}")
 
     def line(self, place: Place) -> int:
-        """Return the line of `place`, counted from 1, or of the innermost table around it that exists."""
-        lines = _Lines(list(_tokens(self.text))).walk()
-        return next(lines[place[:end]] for end in range(len(place), -1, -1) if place[:end] in lines)
+        """Return the line of `place`, counted from 1, or of the innermost table around it that exists: the first lines
+        that have it end with its own.
+        """
+        while not _has(tomllib.loads(self.text), place):
+            place = place[:-1]
+        lines = self.text.split("\n")
+        return 1 + bisect_left(range(1, len(lines)), True, key=lambda number: _has(_begun(lines[:number]), place))
 
 
 def read_source(file: "Traversable", raises: type[ThenarError]) -> TomlText:
@@ -114,85 +120,25 @@ def spelled(place: Place) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{shortened(key)}" for key in place).removeprefix(".")
 
 
-def _tokens(text: str) -> Iterator[tuple[str, int]]:
-    """Yield the pieces of TOML that are not blank, with their lines."""
-    line = 1
+def _has(value: Any, place: Place) -> bool:
+    """Return whether a table has a place."""
+    try:
+        for key in place:
+            value = value[key]
+    except (KeyError, IndexError, TypeError):
+        return False
+    return True
+
+
+def _begun(lines: Sequence[str]) -> dict[str, object]:
+    """Return the content of the first lines of a valid file: what they open, lists, tables and a text, is closed."""
+    text, token, closing = "".join(f"{line}\n" for line in lines), "", list[str]()
     for found in _TOKEN.finditer(text):
-        if found.lastgroup != "blank":
-            yield found[0], line
-        line += found[0].count("\n")
-
-
-class _Lines(Struct):
-    """Walks through the tokens of a valid TOML file and records the line of every table, key and list entry."""
-
-    tokens: list[tuple[str, int]]
-    lines: dict[Place, int] = field(default_factory=lambda: {(): 1})
-    counts: Counter[Place] = field(default_factory=Counter)  # of the tables under every [[header]] so far
-    next: int = 0
-
-    def walk(self) -> dict[Place, int]:
-        table: Place = ()
-        while self._here():
-            if self._passed("["):
-                table = self._header()
-            elif not self._passed("\n"):
-                self._pair(table)
-        return self.lines
-
-    def _here(self) -> str:
-        return self.tokens[self.next][0] if self.next < len(self.tokens) else ""
-
-    def _passed(self, *marks: str) -> bool:
-        passed = self._here() in marks
-        self.next += passed
-        return passed
-
-    def _header(self) -> Place:
-        """Pass `a.b]` or `[a.b]]`; return the table's place."""
-        line, many = self.tokens[self.next][1], self._passed("[")
-        place = self._key(())
-        if many:
-            self.counts[place] += 1
-            place = (*place, self.counts[place] - 1)
-        self.lines[place] = line
-        self.next += 1 + many
-        return place
-
-    def _pair(self, table: Place) -> None:
-        place = self._key(table)
-        self.next += 1  # the equals sign
-        self._value(place)
-
-    def _key(self, place: Place) -> Place:
-        """Pass a dotted key and record every table on its way; for a list of tables, the last one counts."""
-        while True:
-            token, line = self.tokens[self.next]
-            self.next += 1
-            place = (*place, _unquoted(token))
-            self.lines.setdefault(place, line)
-            if not self._passed("."):
-                return place
-            if place in self.counts:
-                place = (*place, self.counts[place] - 1)
-
-    def _value(self, place: Place) -> None:
-        if self._passed("["):
-            number = 0
-            while not self._passed("]"):
-                if not self._passed(",", "\n"):
-                    self.lines[(*place, number)] = self.tokens[self.next][1]
-                    self._value((*place, number))
-                    number += 1
-        elif self._passed("{"):
-            while not self._passed("}"):
-                if not self._passed(",", "\n"):
-                    self._pair(place)
-        else:
-            while self._here() not in (",", "]", "}", "\n", ""):
-                self.next += 1
-
-
-def _unquoted(key: str) -> str:
-    """Return the text of a bare or quoted key."""
-    return next(iter(tomllib.loads(f"{key} = 0"))) if key[0] in "\"'" else key
+        token = found[0]
+        if token in _CLOSING:
+            closing.append(_CLOSING[token])
+        elif closing and token == closing[-1]:
+            closing.pop()
+    # A text that is not closed takes the last line feed, too.
+    quotes = token[:3] if token[:3] in ('"""', "'''") and token.endswith("\n") else ""
+    return tomllib.loads(text + quotes + "".join(reversed(closing)))

@@ -59,12 +59,19 @@ def check_keys(source: TomlText, place: Place, table: Mapping[str, object], know
 
 def wrong_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:
     """Yield names of a `what` that are invalid or used twice."""
-    seen: dict[str, Place] = {}
-    for place, name in named:
+    all_named = list(named)
+    for place, name in all_named:
         if reason := fault(name):
             yield place, f"{shortened(repr(name))} is not a valid name of a {what}: it {reason}"
+    yield from used_twice(((place, f"{what} {name!r}") for place, name in all_named), "use the name in one place")
+
+
+def used_twice(named: Iterable[tuple[Place, str]], advice: str) -> Iterator[Fault]:
+    """Yield what is named a second time, with its first place."""
+    seen: dict[str, Place] = {}
+    for place, name in named:
         if name in seen:
-            yield place, f"{what} {name!r} is already {spelled(seen[name])}: use the name in one place"
+            yield place, f"{name} is already {spelled(seen[name])}: {advice}"
         seen[name] = place
 
 

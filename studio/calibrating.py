@@ -133,7 +133,7 @@ def lead_presses(
         if stop.is_set():
             return None
         lines = learnt_lines(names, rested, codes, 1.0 if newtons is None else newtons)
-        return names, TaxelCalibration(subject=subject, unit="press" if newtons is None else "N", taxels=lines)
+        return names, TaxelCalibration(subject=subject, unit="press" if newtons is None else "N", sensors=lines)
 
 
 def _uncalibrated(glove: Path) -> Harness:

@@ -232,7 +232,7 @@ class GlovePage:
         found = lead_presses(self._project.harness, _HOLD_S, view, stop, self._project.state.wearer)
         if found is not None:
             names, pads = found
-            self._written("taxels", _PADS_FILE, [line.name for line in pads.taxels], names, pads.to_toml())
+            self._written("taxels", _PADS_FILE, [line.name for line in pads.sensors], names, pads.to_toml())
 
     def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> None:
         """Write a calibration of sensors, and name it in glove.toml."""

@@ -90,7 +90,7 @@ class GloveSensors:
             "closed": [value == 1 for value in shown[:first]] + [False] * len(self._pads),
             "lost": [value is None for value in shown[:last]],
             "pressed": [
-                None if count is None or line is None else round((count - line.rest) / (line.press - line.rest), 3)
+                None if count is None or line is None else round((count - line.raw_a) / (line.raw_b - line.raw_a), 3)
                 for count, line in zip(shown[first:last], self._pads, strict=True)
             ],
             "values": [

@@ -1,6 +1,7 @@
-"""Harnesses that several tests wire."""
+"""Harnesses that several tests wire, and lines of taxels."""
 
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
+from thenar.runtime.taxels import TaxelLine
 
 
 def behind(*places: tuple[int, int] | None) -> Harness:
@@ -15,3 +16,8 @@ def behind(*places: tuple[int, int] | None) -> Harness:
         for number, place in enumerate(places)
     )
     return Harness(name="x", buses=(BusWiring(device="d", clock_hz=400_000, chips=chips),))
+
+
+def pad_line(name: str, rest: int, press: int, value: float = 1.0) -> TaxelLine:
+    """Return the line of a taxel whose press is worth `value`."""
+    return TaxelLine(name, rest, 0.0, press, value)

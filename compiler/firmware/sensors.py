@@ -159,7 +159,7 @@ def _taxel(threshold: Threshold, lines: TaxelCalibration | None, limits: Range |
     own = None if lines is None else lines.line(coded.name)
     if own is None:  # counts are codes
         return _sensor(coded, (coded.value_a, coded.value_b), (coded.code_a, coded.code_b), grid)
-    return _sensor(coded, (0.0, own.value), (own.rest, own.press), grid)
+    return _sensor(coded, (own.value_a, own.value_b), (own.raw_a, own.raw_b), grid)
 
 
 def _grid(name: str, limits: Range, first: int, last: int) -> CodeGrid:

@@ -26,7 +26,7 @@ class WireTimes:
         self._ns, rooms = list[int](), set(selections(ports, harness))
         opened: dict[Room, tuple[int, int]] = {}
         for number, port in enumerate(ports):
-            clock_hz = harness.line_of(port.bus).clock_hz
+            clock_hz = harness.wires[port.bus].clock_hz
             for room in rooms.intersection(rooms_of(port, harness)):
                 opened[room] = (opened.get(room, (0, 0))[0] | 1 << number, round(1000 * select_us(clock_hz)))
             self._ns.append(round(1000 * port_us(reading_of(port, harness), clock_hz)))

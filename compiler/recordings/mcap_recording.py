@@ -19,6 +19,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from thenar.runtime.calibration import RAW, Meaning, codes_of_bytes, numbers_of
+from thenar.runtime.code_line import code_line
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import StreamWiring
@@ -430,12 +431,12 @@ def _taxel(
     if (target := codings.get(name)) is not None:
         taxel, line = Joint(name, target.unit, *structs.astuple(_points(target))), None
     elif line is not None:
-        taxel = Joint(name, _taxel_unit(first), line.rest, 0.0, line.press, line.value)
+        taxel = Joint(name, _taxel_unit(first), line.raw_a, line.value_a, line.raw_b, line.value_b)
     coded, codes = BuildCalibration(0, name, taxel.unit, *structs.astuple(_points(taxel))), []
     for part, grasp in grasps:
         count, own = grasp.counts[place], _line(part.session, place)
         assert count is not None
-        code = count if own is None or own == line else own.codes(coded).code(count)
+        code = count if own is None or own == line else code_line(coded, own).code(count)
         codes.append(min(max(code, 0), CODES - 1))
     return codes, taxel
 

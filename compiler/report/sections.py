@@ -235,7 +235,8 @@ def scan_table(content: ReportContent) -> PlainTable | None:
         return None
     rows = []
     for order, port in enumerate(scan.ports, 1):
-        bus, chip = harness.line_of(port.bus), harness.chip_of(port.bus, port.chip)
+        bus = harness.wires[port.bus]
+        chip = bus.chips[port.chip]
         where = (f"{bus.device} at {bus.clock_hz / 1000:g} kHz", chip.place, port.reading)
         switches = ", ".join(names[switch] for switch in port.elements)
         us = microseconds(port_us(reading_of(port, harness), bus.clock_hz))

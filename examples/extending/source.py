@@ -3,12 +3,11 @@
 import os
 import socket
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from thenar.drivers.errors import DeviceError
 from thenar.runtime.frames import GloveFrame
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.sources import Source, SourceKind
 
 PERIOD_US = 20_000
@@ -20,6 +19,7 @@ class FlexSensors(Source):
     name = "flex sensors"
     period_us = PERIOD_US
     longest_us = 2 * PERIOD_US
+    reads_joints = True
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -48,12 +48,8 @@ class FlexSensors(Source):
             self._socket.close()
 
 
-def _sources(_harness: Harness, _names: Sequence[str], _scan: ScanMap) -> Iterator[Source]:
-    yield FlexSensors(int(os.environ["FLEX_PORT"]))
+def _sources(_harness: Harness, *_: object) -> Iterator[Source]:
+    yield FlexSensors(int(os.environ.get("FLEX_PORT", "9000")))
 
 
-def _periods_us(_harness: Harness, _scan: ScanMap) -> Iterator[int]:
-    yield PERIOD_US
-
-
-MEMBER = SourceKind("flex", "Flex sensors, by UDP: FLEX_PORT.", "joints", _sources, _periods_us, 9)
+MEMBER = SourceKind("flex", _sources, rank=9)

@@ -1,7 +1,7 @@
 """The rules that a harness must satisfy beyond the types of its fields. The first fault in order counts."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from thenar.drivers import cd74hc4067
 from thenar.drivers.errors import SettingError
@@ -14,7 +14,7 @@ from thenar.drivers.transports import OTHER_PORTS, line_port_fault
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
-from ..toml_struct import Fault, wrong_names
+from ..toml_struct import Fault, used_twice, wrong_names
 from .wiring import SLOWEST_HZ, BoardWiring, BusWiring, ChipWiring, GloveWiring, Harness, SpiWiring, StreamWiring
 
 _SENSORS = (18, 22)
@@ -57,14 +57,11 @@ def _of_devices(harness: Harness) -> Iterator[Fault]:
     places += [(("stream", n, "port"), stream.port) for n, stream in enumerate(harness.streams)]
     if harness.cyberglove is not None:
         places.insert(0, (("cyberglove", "port"), harness.cyberglove.port))
-    seen: dict[str, Place] = {}
     for place, device in places:
         fault_of = device_fault if place[-1] == "device" else port_fault
         if reason := (line_port_fault if place[0] == "stream" else fault_of)(device):
             yield place, f"{shortened(repr(device))} {reason}"
-        if device in seen:
-            yield place, f"{device} is already {spelled(seen[device])}: name each device in one entry only"
-        seen[device] = place
+    yield from used_twice(places, "name each device in one entry only")
 
 
 def _of_bus(place: Place, bus: BusWiring) -> Iterator[Fault]:
@@ -186,7 +183,7 @@ def _of_board_pins(place: Place, stream: StreamWiring, board: BoardWiring) -> It
     for where, pin in used:
         if not _PIN.fullmatch(pin):
             yield where, f'{shortened(repr(pin))} is no pin of a sketch: write "2", "A0" or "PA3"'
-    yield from _used_twice(used)
+    yield from used_twice(used, "use another one")
 
 
 def _of_multiplexed(place: Place, stream: StreamWiring, behind: Mapping[str, str]) -> Iterator[Fault]:
@@ -197,15 +194,7 @@ def _of_multiplexed(place: Place, stream: StreamWiring, behind: Mapping[str, str
             yield where, f"{pin} is behind a multiplexer, which is for joints and taxels: use another pin"
         if not (channel.isdecimal() and int(channel) < cd74hc4067.CHANNELS):
             yield where, f"{shortened(repr(pin))} is no channel of a CD74HC4067: the channels of A0 are A0.0 to A0.15"
-    yield from _used_twice([((*place, "pins", name), pin) for name, pin in behind.items()])
-
-
-def _used_twice(used: Iterable[tuple[Place, str]]) -> Iterator[Fault]:
-    seen: dict[str, Place] = {}
-    for where, pin in used:
-        if pin in seen:
-            yield where, f"{pin} is already {spelled(seen[pin])}: use another one"
-        seen[pin] = where
+    yield from used_twice([((*place, "pins", name), pin) for name, pin in behind.items()], "use another one")
 
 
 def _of_values(place: Place, stream: StreamWiring) -> Iterator[Fault]:

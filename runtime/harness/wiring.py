@@ -4,7 +4,7 @@ The structs are the tables of `glove.toml`, field by field; a loaded harness is 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from msgspec import Meta, Struct, field
 
@@ -213,14 +213,22 @@ class BusWiring(_Table, frozen=True):
 
 class SpiWiring(_Table, frozen=True):
     """A converter on SPI: its device, its kind (a key of SPI_CHIPS), its clock (None: its fastest at 3.3 V), the
-    taxel on each of its channels, and how often it is read at most, in times a second.
+    taxel on each of its channels, and how often it is read at most, in times a second. It is a bus with one chip.
     """
+
+    mux: ClassVar[None] = None
+    measures: ClassVar[bool] = True
 
     device: Text
     kind: str
     hz: Annotated[int, Meta(ge=SLOWEST_HZ, le=50_000_000)] | None = field(default=None, name="clock_hz")
     rate_hz: ScanRate = SCANS_HZ
     pins: dict[str, str] = {}
+
+    @property
+    def chips(self) -> tuple[Self]:
+        """The only chip."""
+        return (self,)
 
     @property
     def chip(self) -> "SpiChip":
@@ -269,18 +277,26 @@ class Harness(_Table, frozen=True):
     taxel_settings: TaxelSettings = field(default=TaxelSettings(), name="taxels")
 
     @property
+    def wires(self) -> tuple[BusWiring | SpiWiring, ...]:
+        """The I2C buses, then the SPI devices: scan maps number them in this order."""
+        return (*self.buses, *self.spi)
+
+    @property
+    def chips(self) -> tuple[ChipWiring | SpiWiring, ...]:
+        """All chips, bus after bus."""
+        return tuple(chip for wire in self.wires for chip in wire.chips)
+
+    @property
     def switches(self) -> tuple[str, ...]:
         """The names of all wired switches: the chips', pin by pin, then the streams'."""
-        chips = (chip for bus in self.buses for chip in bus.chips if not chip.measures)
-        streams = (name for stream in self.streams for name in stream.switches)
-        return (*(name for chip in chips for name in chip.numbered_pins.values()), *streams)
+        chips = (name for chip in self.chips if not chip.measures for name in chip.numbered_pins.values())
+        return (*chips, *(name for stream in self.streams for name in stream.switches))
 
     @property
     def taxel_names(self) -> tuple[str, ...]:
         """The names of all wired taxels: the converters', channel by channel, then the streams'."""
-        chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
-        streams = (name for stream in self.streams for name in stream.taxels)
-        return (*(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()), *streams)
+        chips = (name for chip in self.chips if chip.measures for name in chip.numbered_pins.values())
+        return (*chips, *(name for stream in self.streams for name in stream.taxels))
 
     @property
     def joint_device(self) -> GloveWiring | StreamWiring | None:
@@ -297,20 +313,3 @@ class Harness(_Table, frozen=True):
     def calibration(self) -> str | None:
         """The path of the joints' calibration."""
         return None if self.joint_device is None else self.joint_device.calibration
-
-    @property
-    def on_chips(self) -> int:
-        """The number of switches and taxels that are wired to chips."""
-        chips: list[ChipWiring | SpiWiring] = [*(chip for bus in self.buses for chip in bus.chips), *self.spi]
-        return sum(len(chip.pins) for chip in chips)
-
-    def chip_of(self, bus: int, number: int) -> ChipWiring | SpiWiring:
-        """Return a chip by the numbering of scan maps: bus after bus, then every SPI device as a bus of one chip.
-
-        Raises IndexError if there is none.
-        """
-        return self.buses[bus].chips[number] if bus < len(self.buses) else (self.spi[bus - len(self.buses)],)[number]
-
-    def line_of(self, bus: int) -> BusWiring | SpiWiring:
-        """Return a bus, or an SPI device, by the numbering of scan maps."""
-        return self.buses[bus] if bus < len(self.buses) else self.spi[bus - len(self.buses)]

@@ -14,8 +14,8 @@ from ..frames import GloveFrame, SwitchFrame
 from ..harness.wiring import FASTEST_HZ, Harness
 from ..names import list_names
 from ..scanning.scanmap import ScanMap
-from ..sources.base import SOURCES, Source
-from ..taxels import LiveTaxel
+from ..sources.base import Source, sources_of
+from ..taxels import LiveTaxel, calibration_of
 from .quarantine import Chattering, numbers
 
 # A device may be this many times as slow as its wire, and this much: computers have other things to do, too.
@@ -64,11 +64,10 @@ def check_up(
         buses=tuple(replace(bus, rate_hz=FASTEST_HZ) for bus in harness.buses),
         spi=tuple(replace(device, rate_hz=FASTEST_HZ) for device in harness.spi),
     )
-    for kind in SOURCES.values():
-        for source in kind.sources(fastest, names, scan):
-            if sensors is not None:
-                source.read_only(sensors)
-            yield partial(_check, source, fastest, names)
+    for source in sources_of(fastest, names, scan, calibration_of(fastest.taxel_settings)):
+        if sensors is not None:
+            source.read_only(sensors)
+        yield partial(_check, source, fastest, names)
 
 
 def _check(source: Source, harness: Harness, names: Sequence[str]) -> tuple[CheckResult, ...]:

@@ -6,22 +6,17 @@ from ..scores import softmax
 
 
 class Ranking:
-    """The K scores of a frame (2^15 too high); K + 1 if the build refuses frames (`Build.with_none`)."""
+    """The K scores of a frame (2^15 too high), K + 1 if the build refuses frames (`Scorer.with_none`); the best class,
+    and its lead over the second best, in steps.
+    """
 
-    __slots__ = ("_margin", "_shares", "biased_scores", "candidate")
+    __slots__ = ("_shares", "biased_scores", "candidate", "margin")
 
     def __init__(self, biased_scores: tuple[int, ...]) -> None:
+        second, best = sorted(biased_scores)[-2:]
         self.biased_scores = biased_scores
-        self.candidate = biased_scores.index(max(biased_scores))
-        self._margin, self._shares = -1, (0.0, list[float]())
-
-    @property
-    def margin(self) -> int:
-        """The candidate's lead over the second best, in steps."""
-        if self._margin < 0:
-            second, best = sorted(self.biased_scores)[-2:]
-            self._margin = best - second
-        return self._margin
+        self.candidate, self.margin = biased_scores.index(best), best - second
+        self._shares = 0.0, list[float]()
 
     def lead(self, held: int) -> int:
         """Return the candidate's lead over class `held`, in steps."""

@@ -66,7 +66,7 @@ class LiveRecognizer:
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
-        self._build, self._policy, self._grasps = build, policy or Policy(), build.classes
+        self._scorer, self._policy, self._grasps = build.scorer, policy or Policy(), build.classes
         tables = build.tables
         self._scale, self._all_switches = tables.scale, (1 << tables.n_switches) - 1
         self._reads_switches = switch_period_us is not None and tables.n_switches > 0
@@ -106,9 +106,8 @@ class LiveRecognizer:
         lost_joints = self._joints.lost if codes else 0
         closed, lost = (0, self._all_switches) if frame is None else (frame.closed & ~frame.lost, frame.lost)
         if (state := (closed, lost, codes, lost_joints)) != self._state:
-            self._biased_scores = self._build.scorer.state_scores(*state)
-            counts = closed.bit_count(), lost.bit_count()
-            ranked, self._refused = self._build.with_none(self._biased_scores, *counts, codes, lost_joints)
+            self._biased_scores = self._scorer.state_scores(*state)
+            ranked, self._refused = self._scorer.with_none(self._biased_scores, *state)
             self._ranking, self._state = Ranking(ranked), state
         biased_scores, standing, refused = self._biased_scores, self._ranking, self._refused
         missing, too_much = self._missing.of(lost, lost_joints | joints_lost)

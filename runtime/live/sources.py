@@ -15,7 +15,8 @@ from ..frames import GloveFrame, Mask, Newest, SwitchFrame, now_us
 from ..harness.wiring import Harness
 from ..published import Count, DeviceHealth
 from ..scanning.scanmap import ScanMap
-from ..sources.base import SOURCES, Source
+from ..sources.base import Source, slowest_us, sources_of
+from ..taxels import calibration_of
 
 if TYPE_CHECKING:
     from logging import Logger
@@ -277,18 +278,16 @@ class Sources:
         scan: ScanMap,
         sensors: Sequence[str] | None = None,
     ) -> None:
-        made = [(kind, source) for kind in SOURCES.values() for source in kind.sources(harness, switch_names, scan)]
-        self._devices = tuple(source for _, source in made)
-        self._readers = tuple(source for kind, source in made if kind.reads == "switches")
-        self._gloves = tuple(source for kind, source in made if kind.reads == "joints")
-        self._arrivals = FrameBuffer(len(switch_names), [reader.owned for reader in self._readers])
+        self._devices = sources_of(harness, switch_names, scan, calibration_of(harness.taxel_settings))
+        self._arrivals = FrameBuffer(len(switch_names), [device.owned for device in self._devices])
         if sensors is not None:
             for device in self._devices:
                 device.read_only(sensors)
         self.take: Callable[..., Snapshot] = partial(self._arrivals.take, self._patience_us)
         self.changed = True
         self._keepers = [
-            DeviceThread(source.name, source, self._taking(source), self._change) for source in self._devices
+            DeviceThread(source.name, source, self._taking(part, source), self._change)
+            for part, source in enumerate(self._devices)
         ]
 
     def _change(self) -> None:
@@ -299,13 +298,13 @@ class Sources:
 
     @property
     def switch_period_us(self) -> int | None:
-        """The longest expected period of the switches; None if nothing reads them."""
-        return max((reader.period_us for reader in self._readers), default=None)
+        """The longest expected period of switches and taxels; None if nothing reads them."""
+        return slowest_us(device for device in self._devices if device.owned or device.taxels)
 
     @property
     def glove_period_us(self) -> int | None:
         """The longest expected period of the glove; None if there is none."""
-        return max((glove.period_us for glove in self._gloves), default=None)
+        return slowest_us(device for device in self._devices if device.reads_joints)
 
     def devices(self) -> tuple[DeviceHealth, ...]:
         """Return the state of every device."""
@@ -345,14 +344,13 @@ class Sources:
         for keeper in self._keepers:
             keeper.close()
 
-    def _taking(self, source: Source) -> Callable[[SwitchFrame | GloveFrame], None]:
+    def _taking(self, part: int, source: Source) -> Callable[[SwitchFrame | GloveFrame], None]:
         """Return a function that takes the frames of a source, of either kind."""
-        part = self._readers.index(source) if source in self._readers else None
 
         def take(frame: SwitchFrame | GloveFrame) -> None:
             if isinstance(frame, GloveFrame):
                 self._arrivals.put_glove(frame, source.longest_us)
-            elif part is not None:
+            else:
                 self._arrivals.put_switches(part, frame, source.longest_us)
 
         return take

@@ -12,7 +12,7 @@ from ..harness.wiring import Harness, StreamWiring
 from ..names import list_names
 from ..policy import Policy
 from ..scanning.scanmap import ScanMap
-from ..sources.base import slowest_us
+from ..sources.base import slowest_us, sources_of
 from ..taxels import calibration_of, in_counts
 from .recogniser import LiveRecognizer
 from .sources import Sources
@@ -23,7 +23,7 @@ def unread_joints(harness: Harness, scan: ScanMap, joints: Sequence[str]) -> str
 
     Raises SettingError if the harness reads joints, but lacks one of the build.
     """
-    if not joints or slowest_us(harness, scan, "joints") is not None:
+    if not joints or any(source.reads_joints for source in sources_of(harness, (), scan)):
         for joint in joints if harness.joint_device is not None else ():
             place_of(joint, harness.sensor_names)
         return ""
@@ -84,12 +84,13 @@ class LiveSystem(Struct, frozen=True, eq=False):
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
+        devices = sources_of(self.harness, self.switch_names, self.scan)
         return LiveRecognizer(
             self.build,
             sensor_names=self.sensor_names,
             calibration=self._meaning,
-            switch_period_us=slowest_us(self.harness, self.scan, "switches"),
-            glove_period_us=slowest_us(self.harness, self.scan, "joints"),
+            switch_period_us=slowest_us(device for device in devices if device.owned),
+            glove_period_us=slowest_us(device for device in devices if device.reads_joints),
             policy=self.policy,
         )
 

@@ -53,7 +53,7 @@ DEFINITIONS = {
 WRITER = "thenar "
 
 SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS, TAXELS = range(1, 7)
-# Channel number: (topic, type of its messages). The taxels' channel exists only if the glove has taxels.
+# Channel number: (topic, type of its messages).
 CHANNELS = {
     SWITCHES: ("/thenar/switches", BYTES),
     GLOVE: ("/thenar/glove", BYTES),
@@ -73,7 +73,7 @@ class Tail:
 
     size: int = 0
     crc: int = 0
-    counts: dict[int, int] = field(default_factory=lambda: dict.fromkeys(range(SWITCHES, TAXELS), 0))
+    counts: dict[int, int] = field(default_factory=lambda: dict.fromkeys(CHANNELS, 0))
     first_ns: int | None = None
     last_ns: int = 0
     sessions: list[tuple[int, int]] = field(default_factory=list)
@@ -89,16 +89,14 @@ class Tail:
 
     def add_message(self, channel: int, log_ns: int) -> None:
         """Count a message."""
-        self.counts[channel] = self.counts.get(channel, 0) + 1
+        self.counts[channel] += 1
         self.first_ns = log_ns if self.first_ns is None else min(self.first_ns, log_ns)
         self.last_ns = max(self.last_ns, log_ns)
 
 
-def beginning(version: str, tail: Tail | None = None) -> bytes:
-    """Return the first bytes of a recording by this version of thenar, with the channels that `tail` counts, up to its
-    first session.
-    """
-    return MAGIC + encode(Opcode.HEADER, "ros2", f"{WRITER}{version}") + _schemas() + _channels(tail or Tail())
+def beginning(version: str) -> bytes:
+    """Return the first bytes of a recording by this version of thenar, up to its first session."""
+    return MAGIC + encode(Opcode.HEADER, "ros2", f"{WRITER}{version}") + _descriptions()
 
 
 def session_record(session: Session) -> bytes:
@@ -121,7 +119,7 @@ def ending(tail: Tail) -> bytes:
     """Return the bytes that close a recording: the end of its data, a summary, the footer."""
     data_end = encode(Opcode.DATA_END, tail.crc)
     indices = b"".join(encode(Opcode.METADATA_INDEX, offset, length, METADATA) for offset, length in tail.sessions)
-    summary = _schemas() + _channels(tail) + _statistics(tail) + indices
+    summary = _descriptions() + _statistics(tail) + indices
     start = tail.size + len(data_end)
     # The CRC of a summary covers the footer up to the CRC itself.
     open_footer = encode(Opcode.FOOTER, start, 0, 0)[:-4]
@@ -129,20 +127,17 @@ def ending(tail: Tail) -> bytes:
     return data_end + summary + footer + MAGIC
 
 
-def _schemas() -> bytes:
-    return b"".join(
-        encode(Opcode.SCHEMA, _SCHEMAS[name], name, "ros2msg", text.encode()) for name, text in DEFINITIONS.items()
-    )
-
-
-def _channels(tail: Tail) -> bytes:
+def _descriptions() -> bytes:
+    """Return the records of schemas and channels."""
     # The profile requires the key; if it is empty, a player uses its own settings.
     qos = {"offered_qos_profiles": ""}
-    return b"".join(
-        encode(Opcode.CHANNEL, number, _SCHEMAS[name], topic, "cdr", qos)
-        for number, (topic, name) in CHANNELS.items()
-        if number in tail.counts
-    )
+    records = [
+        encode(Opcode.SCHEMA, _SCHEMAS[name], name, "ros2msg", text.encode()) for name, text in DEFINITIONS.items()
+    ]
+    records += [
+        encode(Opcode.CHANNEL, number, _SCHEMAS[name], topic, "cdr", qos) for number, (topic, name) in CHANNELS.items()
+    ]
+    return b"".join(records)
 
 
 def _statistics(tail: Tail) -> bytes:

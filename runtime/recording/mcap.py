@@ -143,7 +143,7 @@ class End:
 class RecordStream:
     """Iterates over the whole records of `path`; `end` is known afterwards. Memory use is bounded for any file.
 
-    A section begins with the file; another one wherever `begin_section` is called.
+    A section begins with the file, another one after the end of the data.
     """
 
     def __init__(self, path: Path) -> None:
@@ -162,6 +162,8 @@ class RecordStream:
             file.seek(len(MAGIC))
             while (record := self._next(file)) is not None:
                 yield record
+                if record.opcode == Opcode.DATA_END:
+                    self._crc = 0
                 if record.opcode == Opcode.FOOTER:
                     whole, closed = record.end + len(MAGIC), file.read(len(MAGIC)) == MAGIC
                     if closed:
@@ -170,10 +172,6 @@ class RecordStream:
                     else:
                         self.end = End(False, record.end, self.size, "its last 8 bytes are missing or damaged")
                     return
-
-    def begin_section(self) -> None:
-        """Start the checksum after the newest record."""
-        self._crc = 0
 
     def _next(self, file: BinaryIO) -> RawRecord | None:
         offset = file.tell()

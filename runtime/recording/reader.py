@@ -235,7 +235,6 @@ class Reader:
 
     def _end_data(self, record: RawRecord) -> None:
         self._in_data = False
-        self._records.begin_section()
         (crc,), rest = _fields(Opcode.DATA_END, record.content or b"")
         self._check("its data", crc, record.before, rest)
 

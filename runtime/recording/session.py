@@ -1,14 +1,12 @@
 """A recording's description of itself: the glove, how it was read, for whom. Stored as text for every MCAP tool.
 
-MCAP holds it as one Metadata record called `thenar`: one key per field, text as it is, all else as JSON. A recording
+MCAP holds it as one Metadata record called `thenar`, with the version of this form and the session as JSON. A recording
 that was resumed holds one for every time that it was begun, each with its own clock.
 """
 
-import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
-from msgspec.structs import fields
 
 from thenar.drivers.calibration import GloveCalibration
 
@@ -18,7 +16,7 @@ from ..policy import Policy
 from ..taxels import TaxelCalibration
 
 METADATA = "thenar"
-VERSION = 1
+VERSION = "2"
 # Limits of any glove, taxonomy and patience. A file that exceeds them is damaged, or made to fill the memory.
 _MOST_SWITCHES, _MOST_SENSORS, _MOST_TYPES, _MOST_OBJECTS = 65_536, 255, 10_000, 1000
 MOST_TRIALS = 1_000_000
@@ -70,7 +68,7 @@ class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     object: str
 
 
-class Session(msgspec.Struct, frozen=True, kw_only=True):
+class Session(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One stretch of recording.
 
     thenar       the version that recorded
@@ -99,33 +97,20 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
     taxel_calibration: TaxelCalibration | None = None
 
 
-_FIELDS = fields(Session)
-# Written only if there are any: a glove without taxels has no such keys.
-_OF_TAXELS = ("taxels", "taxel_calibration")
-
-
 def to_metadata(session: Session) -> dict[str, str]:
     """Return `session` as the keys and texts of a Metadata record."""
-    written = [field.name for field in _FIELDS if session.taxels or field.name not in _OF_TAXELS]
-    values = {name: getattr(session, name) for name in written}
-    texts = {
-        name: value if isinstance(value, str) else msgspec.json.encode(value).decode() for name, value in values.items()
-    }
-    return {"version": str(VERSION), **texts}
+    return {"version": VERSION, "session": msgspec.json.encode(session).decode()}
 
 
 def from_metadata(texts: dict[str, str]) -> Session:
-    """Return the session that a Metadata record holds. Raises FormatError saying which key is wrong."""
-    version = texts.get("version", "")
-    # No more digits than any version will have, and than int() accepts.
-    if not re.fullmatch("[0-9]{1,9}", version):
-        raise FormatError(f"its version is {shortened(repr(version), 20)}, not a number: it was not recorded by thenar")
-    if int(version) != VERSION:
-        raise FormatError(f"it is of version {version}, this thenar reads {VERSION}: use the thenar that recorded it")
-    for field in _FIELDS:
-        if field.required and field.name not in texts:
-            raise FormatError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
-    session = Session(**{field.name: _value(field, texts) for field in _FIELDS if field.name in texts})
+    """Return the session that a Metadata record holds. Raises FormatError saying what is wrong."""
+    if (version := texts.get("version", "")) != VERSION:
+        found = f"it is of version {shortened(version, 20) or '?'}, this thenar reads {VERSION}"
+        raise FormatError(f"{found}: use the thenar that recorded it")
+    try:
+        session = msgspec.json.decode(texts.get("session", ""), type=Session)
+    except (ValueError, RecursionError) as wrong:
+        raise FormatError(f"its session cannot be read: {shortened(str(wrong), 200)}") from None
     _check_names(session)
     return session
 
@@ -138,13 +123,3 @@ def _check_names(session: Session) -> None:
     for name in sorted(names):
         if reason := fault(name):
             raise FormatError(f"its metadata name {shortened(repr(name))}, which {reason}")
-
-
-def _value(field: Any, texts: dict[str, str]) -> Any:
-    text = texts[field.name]
-    if field.type is str:
-        return text
-    try:
-        return msgspec.json.decode(text, type=field.type)
-    except (msgspec.DecodeError, ValueError, RecursionError) as wrong:
-        raise FormatError(f"its metadata {field.name!r} cannot be read: {shortened(str(wrong), 200)}") from None

@@ -96,8 +96,6 @@ class Recorder(Closing):
             self._tail.add_session(len(record))
         self._grasp = ""
         self._switches, self._sensors, self._taxels = len(session.switches), len(session.sensors), len(session.taxels)
-        if session.taxels:
-            self._tail.counts.setdefault(layout.TAXELS, 0)
 
     @property
     def failure(self) -> str | None:
@@ -263,9 +261,7 @@ def _begun(path: Path, session: Session) -> Tail:
     if path.exists():
         raise SettingError(f"{path} exists, and a recording is never overwritten: name another file")
     tail = Tail()
-    if session.taxels:
-        tail.counts[layout.TAXELS] = 0
-    first, record = layout.beginning(session.thenar, tail), layout.session_record(session)
+    first, record = layout.beginning(session.thenar), layout.session_record(session)
     # Written whole or not at all, so that no file lacks a session.
     write_atomically(path, first + record, mode=_PRIVATE)
     tail.add_bytes(first + record)

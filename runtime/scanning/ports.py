@@ -45,18 +45,15 @@ def ports_of(harness: Harness, numbers: Mapping[str, int], levels: Levels) -> tu
     """Return the fewest ports whose replies hold all switches of `numbers` that are wired to chips, chip by chip, and
     the conversions of all taxels of `levels`.
     """
-    expanders = (
-        port
-        for bus, wiring in enumerate(harness.buses)
-        for chip, wired in enumerate(wiring.chips)
-        for port in (_conversions(bus, chip, wired, levels) if wired.measures else _ports(bus, chip, wired, numbers))
-    )
-    spi = (
-        port
-        for bus, device in enumerate(harness.spi, start=len(harness.buses))
-        for port in _conversions(bus, 0, device, levels)
-    )
-    return (*expanders, *spi)
+    ports = list[Port]()
+    for bus, wire in enumerate(harness.wires):
+        chips: tuple[ChipWiring | SpiWiring, ...] = wire.chips
+        for number, wired in enumerate(chips):
+            if isinstance(wired, SpiWiring) or wired.measures:
+                ports += _conversions(bus, number, wired, levels)
+            else:
+                ports += _ports(bus, number, wired, numbers)
+    return tuple(ports)
 
 
 def _ports(bus: int, number: int, wired: ChipWiring, numbers: Mapping[str, int]) -> list[Port]:

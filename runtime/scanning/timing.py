@@ -63,12 +63,12 @@ def select_us(clock_hz: int) -> float:
 
 def mux_of(port: Port, harness: Harness) -> MuxChannel | None:
     """Return the channel that a port is behind."""
-    return harness.buses[port.bus].chips[port.chip].mux if port.bus < len(harness.buses) else None
+    return harness.wires[port.bus].chips[port.chip].mux
 
 
 def reading_of(port: Port, harness: Harness) -> Reading:
     """Return the transaction that `port` names. Raises KeyError if its chip has none of that name."""
-    readings = harness.chip_of(port.bus, port.chip).chip.readings
+    readings = harness.wires[port.bus].chips[port.chip].chip.readings
     return {reading.name: reading for reading in readings}[port.reading]
 
 
@@ -81,8 +81,8 @@ def scan_us(scan: ScanMap, harness: Harness) -> ScanTime:
 
 def _reading_us(ports: Sequence[Port], harness: Harness) -> float:
     """Return the time to read these ports. fsum: in another order, the same to the last bit."""
-    chosen = (select_us(harness.buses[bus].clock_hz) for bus, *_ in selections(ports, harness))
-    reads = (port_us(reading_of(port, harness), harness.line_of(port.bus).clock_hz) for port in ports)
+    chosen = (select_us(harness.wires[bus].clock_hz) for bus, *_ in selections(ports, harness))
+    reads = (port_us(reading_of(port, harness), harness.wires[port.bus].clock_hz) for port in ports)
     return fsum((*chosen, *reads))
 
 

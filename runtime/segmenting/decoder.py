@@ -13,6 +13,7 @@ before it decides, and so on.
 
 from collections import deque
 from collections.abc import Sequence
+from functools import lru_cache
 from operator import add
 
 import msgspec
@@ -65,6 +66,22 @@ class _Sources(msgspec.Struct):
         return self.none if self.from_none >> state & 1 else self.first
 
 
+def frame_costs(model: SegmentModel, biased_scores: Sequence[int], refused: bool = False) -> list[int]:
+    """Return the costs of a frame for each of the K + 1 states, from its `n_lanes` scores, of any zero."""
+    best, shift, extra = max(biased_scores), model.shift, model.refusal
+    table = _costs(shift, model.gain, model.most)
+    found = [table[best - lane >> shift] for lane in biased_scores]
+    if extra is None:
+        return found
+    return [*(cost + extra for cost in found), 0] if refused else [*found, extra]
+
+
+@lru_cache
+def _costs(shift: int, gain: int, most: int) -> bytes:
+    """Return the cost of a frame for a state, for each difference of 16-bit scores, after the shift."""
+    return bytes(min(behind * gain >> 8, most) for behind in range(1 << 16 - shift))
+
+
 class Decoder:
     """Decodes a live stream, with a fixed lag: integers only.
 
@@ -99,7 +116,7 @@ class Decoder:
 
     def push(self, biased_scores: Sequence[int], refused: bool = False) -> Decoded:
         """Take the scores of the next tick, and whether its frame is refused (for models with a refusal)."""
-        self._step(self._model.costs(biased_scores, refused))
+        self._step(frame_costs(self._model, biased_scores, refused))
         tick, newest, begun = self._tick - self._lag, *self._newest
         if tick < 0:
             state, start = self._none, 0
@@ -207,7 +224,7 @@ class LiveSegments:
     def __init__(self, model: SegmentModel, grasps: Sequence[str], lag_us: int) -> None:
         """Take the names of the model's types, which may be followed by "none"."""
         self.tick_us = model.tick_us
-        self._model, self._grasps = model, grasps
+        self._model, self._none, self._grasps = model, model.n_types, grasps
         self._lag = lag_us // model.tick_us
         self._decoder = Decoder(model, self._lag)
         self._segments = 0
@@ -246,7 +263,7 @@ class LiveSegments:
         return self.newest
 
     def _push(self, scores: Sequence[int], refused: bool) -> None:
-        found, none = self._decoder.push(scores, refused), self._model.n_types
+        found, none = self._decoder.push(scores, refused), self._none
         self._tick += 1
         number = self._segments + found.segment
         now, newest = (found.state, found.start), (found.newest, found.newest_start)

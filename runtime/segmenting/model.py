@@ -11,8 +11,6 @@ States are the grasp types, 0 to K - 1, and "none", the last, K. Costs are steps
 The first segment begins at no cost.
 """
 
-from collections.abc import Sequence
-from functools import lru_cache
 from typing import Annotated, Self
 
 from msgspec import Meta, Struct
@@ -128,21 +126,6 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
         tick = self.most + max(self.stay) + (self.refusal or 0)
         change = max(*self.enter, *self.leave, *self.direct)
         return 2 * change + (2 * max(self.least) - 1) * tick
-
-    def costs(self, biased_scores: Sequence[int], refused: bool = False) -> list[int]:
-        """Return the costs of a frame for each of the K + 1 states, from its `n_lanes` scores, of any zero."""
-        best, shift, extra = max(biased_scores), self.shift, self.refusal
-        table = _costs(shift, self.gain, self.most)
-        found = [table[best - lane >> shift] for lane in biased_scores]
-        if extra is None:
-            return found
-        return [*(cost + extra for cost in found), 0] if refused else [*found, extra]
-
-
-@lru_cache
-def _costs(shift: int, gain: int, most: int) -> bytes:
-    """Return the cost of a frame for a state, for each difference of 16-bit scores, after the shift."""
-    return bytes(min(behind * gain >> 8, most) for behind in range(1 << 16 - shift))
 
 
 def gain_of(scale: float, temperature: float) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
-from typing import Any, Literal
+from typing import Any
 
 from msgspec import Struct
 
@@ -15,7 +15,7 @@ from ..harness.wiring import Debounce, Harness
 from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import ScanMap
-from ..taxels import LiveTaxel
+from ..taxels import LiveTaxel, TaxelCalibration
 
 # A device is expected back at least this often, however fast it is: a shorter limit would mistake a busy computer, or
 # the 16 ms for which a USB serial adapter may buffer bytes, for a cut cable.
@@ -39,6 +39,8 @@ class Source(ABC):
         How long a frame is current, from its reading time: usually two periods, PERIODS * period_us.
     taxels : sequence of LiveTaxel
         The taxels that it reads.
+    reads_joints : bool
+        Whether it delivers records of joints.
     part : str
         What the device says it is, once it is open; "" if it says nothing.
     notes : sequence of str
@@ -50,6 +52,7 @@ class Source(ABC):
     longest_us: int
     owned: Mask = 0
     taxels: Sequence[LiveTaxel] = ()
+    reads_joints: bool = False
     part: str = ""
     notes: Sequence[str] = ()
 
@@ -98,7 +101,7 @@ class Source(ABC):
 
 
 class SourceKind(Struct, frozen=True):
-    """A kind of source: its devices in a harness, and their periods.
+    """A kind of source, and its devices in a harness.
 
     A module of `thenar.runtime.sources` defines one as `MEMBER`; another package registers one under the entry point
     `thenar.sources`.
@@ -106,37 +109,34 @@ class SourceKind(Struct, frozen=True):
     Attributes
     ----------
     name : str
-        Its name for users: "cyberglove".
-    help : str
-        A sentence on the devices that it reads.
-    reads : {"switches", "joints"}
-        The content of its frames.
+        Its name: "cyberglove".
     sources : callable
-        `sources(harness, switch_names, scan)` yields a `Source` for each device. Switch k of the frames is
-        `switch_names[k]`; `scan` gives the ports to read, in order, and the limits at which levels of taxels close: in
-        this glove's counts (`taxels.count_limit`), once a build has been combined with it.
-    periods_us : callable
-        `periods_us(harness, scan)` yields the longest expected period of each of them, without opening anything: a
-        replay calls it, too.
+        `sources(harness, switch_names, scan, taxels)` yields a `Source` for each device, without opening anything: a
+        replay calls it, too. Switch k of the frames is `switch_names[k]`; `scan` gives the ports to read, in order, and
+        the limits at which levels of taxels close: in this glove's counts (`taxels.count_limit`), once a build has been
+        combined with it. `taxels` is their calibration, or None.
     rank : int
         Orders the kinds.
     """
 
     name: str
-    help: str
-    reads: Literal["switches", "joints"]
-    sources: Callable[[Harness, Sequence[str], ScanMap], Iterable[Source]]
-    periods_us: Callable[[Harness, ScanMap], Iterable[int]]
+    sources: Callable[[Harness, Sequence[str], ScanMap, TaxelCalibration | None], Iterable[Source]]
     rank: int = 0
 
 
 SOURCES = Members("source", SourceKind, "thenar.runtime.sources", "thenar.sources")
 
 
-def slowest_us(harness: Harness, scan: ScanMap, reads: Literal["switches", "joints"]) -> int | None:
-    """Return the longest expected period of switches or joints; None if nothing reads them."""
-    kinds = [kind for kind in SOURCES.values() if kind.reads == reads]
-    return max((us for kind in kinds for us in kind.periods_us(harness, scan)), default=None)
+def sources_of(
+    harness: Harness, switch_names: Sequence[str], scan: ScanMap, taxels: TaxelCalibration | None = None
+) -> tuple[Source, ...]:
+    """Return the devices of a harness; the arguments are those of `SourceKind.sources`."""
+    return tuple(source for kind in SOURCES.values() for source in kind.sources(harness, switch_names, scan, taxels))
+
+
+def slowest_us(sources: Iterable[Source]) -> int | None:
+    """Return the longest expected period of these; None if there are none."""
+    return max((source.period_us for source in sources), default=None)
 
 
 def paced_us(rate_hz: float) -> int:

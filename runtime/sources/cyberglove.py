@@ -8,7 +8,6 @@ from thenar.drivers.cyberglove_protocol import shortest_us
 from ..frames import PERIODS, GloveFrame
 from ..harness.wiring import GloveWiring, Harness
 from ..published import Count
-from ..scanning.scanmap import ScanMap
 from ..scanning.timing import glove_us
 from .base import SHORTEST_US, Source, SourceKind, counted
 
@@ -19,10 +18,14 @@ class GloveDevice(Source):
     info  the glove's description at the last opening
     """
 
+    reads_joints = True
+
     def __init__(self, wiring: GloveWiring) -> None:
         self.name = f"cyberglove at {wiring.port}"
         self.sensors = wiring.all_sensors
-        self.period_us = glove_period_us(wiring)
+        # A glove that cannot reach the requested rate sends as fast as box and line allow.
+        shortest = round(shortest_us(wiring.all_sensors, wiring.baud, status=True, filtered=True))
+        self.period_us = max(SHORTEST_US, shortest, round(1e6 / wiring.rate_hz) if wiring.rate_hz else 0)
         self.longest_us = PERIODS * self.period_us
         self._wiring, self._unplugged = wiring, False
         self.info: GloveInfo | None = None
@@ -87,23 +90,9 @@ class GloveDevice(Source):
         self.driver.close()
 
 
-def glove_period_us(wiring: GloveWiring) -> int:
-    """Return the longest expected period of a CyberGlove with this wiring.
-
-    A glove that cannot reach the requested rate sends as fast as box and line allow.
-    """
-    shortest = round(shortest_us(wiring.all_sensors, wiring.baud, status=True, filtered=True))
-    return max(SHORTEST_US, shortest, round(1e6 / wiring.rate_hz) if wiring.rate_hz else 0)
-
-
-def _sources(harness: Harness, _names: Sequence[str], _scan: ScanMap) -> Iterator[Source]:
+def _sources(harness: Harness, *_: object) -> Iterator[Source]:
     if harness.cyberglove is not None:
         yield GloveDevice(harness.cyberglove)
 
 
-def _periods_us(harness: Harness, _scan: ScanMap) -> Iterator[int]:
-    if harness.cyberglove is not None:
-        yield glove_period_us(harness.cyberglove)
-
-
-MEMBER = SourceKind("cyberglove", "A CyberGlove on a serial line: [cyberglove].", "joints", _sources, _periods_us, 2)
+MEMBER = SourceKind("cyberglove", _sources, rank=2)

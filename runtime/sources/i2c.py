@@ -14,7 +14,7 @@ from ..harness.wiring import Harness
 from ..published import Count
 from ..scanning.scanmap import SCHEMA, Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
-from ..taxels import LiveTaxel, TaxelCalibration, calibration_of
+from ..taxels import LiveTaxel, TaxelCalibration
 from .base import Source, SourceKind, debouncer_of, paced_us
 
 
@@ -30,7 +30,7 @@ class PortReader:
         self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
         self._switches = BitRemap(port.switches)
         self.targets, self.taxel, self.place = self._switches.targets, None, -1
-        wired = harness.chip_of(port.bus, port.chip)
+        wired = harness.wires[port.bus].chips[port.chip]
         if isinstance(wired.chip, Converter | SpiChip):
             channel = [reading.name for reading in wired.chip.readings].index(port.reading)
             name = wired.numbered_pins[channel]
@@ -52,14 +52,13 @@ class PortReader:
 class PortScanner(Source):
     """A device whose ports are read in a scan: those of `ports`, bus number `bus` of a scan map."""
 
-    def __init__(self, harness: Harness, bus: int, ports: Sequence[Port]) -> None:
-        calibration, wiring = calibration_of(harness.taxel_settings), harness.line_of(bus)
+    def __init__(self, harness: Harness, bus: int, ports: Sequence[Port], calibration: TaxelCalibration | None) -> None:
         self._ports = [PortReader(port, harness, calibration) for port in ports]
         self.owned: Mask = sum(port.targets for port in self._ports)
         self.taxels = tuple(port.taxel for port in self._ports if port.taxel is not None)
         self._wire_us = scan_us(ScanMap(SCHEMA, tuple(ports)), harness).us
         self._everything = len(harness.taxel_names)
-        self._every_s, self._due_s, self._held_up = 1.0 / wiring.rate_hz, 0.0, 0
+        self._every_s, self._due_s, self._held_up = 1.0 / harness.wires[bus].rate_hz, 0.0, 0
 
     @property
     def wire_us(self) -> float:
@@ -101,11 +100,11 @@ class I2cDevice(PortScanner):
     accessed.
     """
 
-    def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
+    def __init__(self, harness: Harness, number: int, scan: ScanMap, taxels: TaxelCalibration | None = None) -> None:
         wiring = harness.buses[number]
         ports = [port for port in scan.ports if port.bus == number]
         self.name = f"i2c at {wiring.device}"
-        self.period_us = _bus_period_us(harness, number, scan)
+        self.period_us = max(paced_us(wiring.rate_hz), round(scan_us(scan, harness).us))
         self.longest_us = PERIODS * self.period_us
         chips = sorted({port.chip for port in ports})
         placed = {chip: _placed(harness, number, chip, ports) for chip in chips}
@@ -115,7 +114,7 @@ class I2cDevice(PortScanner):
         reads.sort(key=lambda each: each[0].slow)
         self._reads = [each for each, _ in reads]
         self._scan: Scan | None = None
-        super().__init__(harness, number, [port for _, port in reads])
+        super().__init__(harness, number, [port for _, port in reads], taxels)
 
     @property
     def part(self) -> str:  # type: ignore[override]
@@ -157,23 +156,11 @@ def _placed(harness: Harness, bus: int, number: int, ports: list[Port]) -> Place
     return PlacedChip(chip.chip, chip.address, used, route)
 
 
-def _bus_period_us(harness: Harness, bus: int, scan: ScanMap) -> int:
-    """Return the longest period at which the switches on an I2C bus should be read."""
-    return max(paced_us(harness.buses[bus].rate_hz), round(scan_us(scan, harness).us))
+def _sources(
+    harness: Harness, _names: Sequence[str], scan: ScanMap, taxels: TaxelCalibration | None
+) -> Iterator[Source]:
+    buses = sorted({port.bus for port in scan.ports if port.bus < len(harness.buses)})
+    return (I2cDevice(harness, bus, scan, taxels) for bus in buses)
 
 
-def _sources(harness: Harness, _names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
-    return (I2cDevice(harness, bus, scan) for bus in sorted(_buses(harness, scan)))
-
-
-def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-    return (_bus_period_us(harness, bus, scan) for bus in _buses(harness, scan))
-
-
-def _buses(harness: Harness, scan: ScanMap) -> set[int]:
-    return {port.bus for port in scan.ports if port.bus < len(harness.buses)}
-
-
-MEMBER = SourceKind(
-    "i2c", "Port expanders and converters on an I2C bus: [[bus]].", "switches", _sources, _periods_us, rank=1
-)
+MEMBER = SourceKind("i2c", _sources, rank=1)

@@ -3,11 +3,10 @@
 from thenar.drivers.readers import LineReader
 from thenar.drivers.transports import OTHER_PORTS
 
-from .rows import row_kinds
+from .rows import row_kind
 
-MEMBER = row_kinds(
+MEMBER = row_kind(
     "line",
-    "Lines or frames of numbers over serial, TCP, UDP, Bluetooth or stdin: [[stream]].",
     lambda port: not port.startswith(OTHER_PORTS),
     lambda wiring: LineReader(wiring.port, wiring.baud, len(wiring.columns), wiring.frame),
     3,

@@ -11,7 +11,7 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.lines import Row, RowReader, finite
 from thenar.drivers.lsl import load_pylsl
 
-from .rows import row_kinds
+from .rows import row_kind
 
 _RESOLVE_S, _FORGET_S = 1.0, 2.0
 _BUFFER_S = 10
@@ -75,9 +75,8 @@ class LslReader(RowReader):
             self._inlet = None
 
 
-MEMBER = row_kinds(
+MEMBER = row_kind(
     "lsl",
-    "A stream of the Lab Streaming Layer: [[stream]] from lsl:NAME.",
     lambda port: port.startswith("lsl:"),
     lambda wiring: LslReader(wiring.port),
     4,

@@ -20,7 +20,7 @@ from thenar.drivers.lines import Row
 from thenar.drivers.names import shortened
 from thenar.drivers.readers import LineReader
 
-from .rows import row_kinds
+from .rows import row_kind
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client
@@ -125,9 +125,8 @@ class MqttReader(LineReader):
             self._client = None
 
 
-MEMBER = row_kinds(
+MEMBER = row_kind(
     "mqtt",
-    "Messages of an MQTT topic: [[stream]] from mqtt:HOST:PORT/TOPIC.",
     lambda port: port.startswith("mqtt:"),
     lambda wiring: MqttReader(wiring.port, columns=len(wiring.columns)),
     6,

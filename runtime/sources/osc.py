@@ -17,7 +17,7 @@ from thenar.drivers.lines import LineParser, Row, finite
 from thenar.drivers.names import shortened
 from thenar.drivers.readers import LineReader
 
-from .rows import row_kinds
+from .rows import row_kind
 
 _PORT = re.compile(r"osc:([^/]+:[0-9]{1,5})(/[^ #*,?\[\]{}]*[^ #*,?\[\]{}/])")
 
@@ -82,9 +82,8 @@ class OscReader(LineReader):
         super().open()
 
 
-MEMBER = row_kinds(
+MEMBER = row_kind(
     "osc",
-    "Messages of Open Sound Control: [[stream]] from osc:HOST:PORT/ADDRESS.",
     lambda port: port.startswith("osc:"),
     lambda wiring: OscReader(wiring.port),
     7,

@@ -23,7 +23,7 @@ from thenar.drivers.senders import FirstSender
 
 from .. import ros
 from ..frames import now_us
-from .rows import row_kinds
+from .rows import row_kind
 
 if TYPE_CHECKING:
     from ..ros_dds import DdsNode
@@ -125,9 +125,8 @@ class RosReader(RowReader):
             self._node = None
 
 
-MEMBER = row_kinds(
+MEMBER = row_kind(
     "ros",
-    "A topic of ROS 2, JointState, UInt8MultiArray or Float32MultiArray: [[stream]] from ros:/TOPIC.",
     lambda port: port.startswith("ros:"),
     lambda wiring: RosReader(wiring.port),
     5,

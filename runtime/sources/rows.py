@@ -4,7 +4,6 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 from thenar.drivers.lines import CLOCK_US, SEQUENCES, UNITS_US, Row, RowReader
 from thenar.drivers.senders import SILENCE_US
@@ -14,7 +13,7 @@ from ..harness.wiring import Harness, Range, StreamWiring
 from ..names import list_names, shortened
 from ..published import Count
 from ..scanning.scanmap import ScanMap
-from ..taxels import Level, LiveTaxel, calibration_of
+from ..taxels import Level, LiveTaxel, TaxelCalibration
 from .base import SHORTEST_US, Source, SourceKind, counted, debouncer_of
 
 # Codes of joints are bytes, as a CyberGlove's; 0 is a joint without a value. A taxel's whole numbers are its codes;
@@ -39,8 +38,13 @@ _SILENT = f"connected, but no row has come for {_NOTICE_US / 1e6:g} s or longer:
 _NO_TIME = "leave out `time` in glove.toml"
 # A serial adapter, or a radio, may hold a row back for this long in normal operation.
 _WAY_US = 20_000
-# Rows that do not count: they come after a later one; their clock is not the one whose rows still come.
-_LATE, _JUMPED = -1, -2
+# By their counts, rows whose clock is wrong.
+_WRONG = {
+    "untimed": "rows come whose clock is missing, or no time, and are left out",
+    "late": "rows come after later ones and are left out: do two programs send?",
+    "jumped": "rows of another clock come and are left out: do two programs send?",
+    "restarts": "its clock has restarted: was the board reset, or does another program send?",
+}
 
 
 class SenderClock:
@@ -54,24 +58,24 @@ class SenderClock:
         self._came_us = self._shown_us = self._until_us = 0
         self._offsets = [0.0, 0.0]
 
-    def host_us(self, sent_us: float, came_us: int) -> int | None:
+    def host_us(self, sent_us: float, came_us: int) -> int | str:
         """Return the time of a row that its sender stamped `sent_us`.
 
-        _LATE if it comes after a later one, _JUMPED if it has another clock than the rows that still come, None if the
-        sender's clock has restarted, and this clock with it.
+        "late" if it comes after a later one, "jumped" if it has another clock than the rows that still come, "restarts"
+        if the sender's clock has restarted, and this clock with it.
         """
         last = self.last_us
         if last is not None:
             step, longest_us = sent_us - last, came_us - self._came_us + _AHEAD_US
             if -_BACK_US < step < 0:
-                return _LATE
+                return "late"
             if 0 <= step + self._turn_us <= longest_us:
                 self._offsets = [offset + self._turn_us for offset in self._offsets]
             elif not 0 <= step <= longest_us:
                 if came_us - self._came_us < SILENCE_US:
-                    return _JUMPED
+                    return "jumped"
                 self.last_us = None
-                return None
+                return "restarts"
         offset = came_us - sent_us
         if last is None or came_us > self._until_us:
             self._offsets = [offset, offset if last is None else self._offsets[0]]
@@ -212,11 +216,19 @@ class RowSource(Source):
     Without that call, which comes for a build, they must have all joints, and without levels all taxels.
     """
 
-    def __init__(self, reader: RowReader, harness: Harness, number: int, names: Sequence[str], scan: ScanMap) -> None:
+    def __init__(
+        self,
+        reader: RowReader,
+        harness: Harness,
+        number: int,
+        scan: ScanMap,
+        taxels: TaxelCalibration | None = None,
+    ) -> None:
         wiring, read = harness.streams[number], scan.streams[number]
         self.name = f"stream from {wiring.port}"
         self.reader, self.wiring = reader, wiring
-        self.period_us = stream_period_us(wiring)
+        # With the transport of a row on a good line.
+        self.period_us = max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS
         self.longest_us = PERIODS * self.period_us
         wanted = (*wiring.used, *([] if wiring.time is None else [wiring.time]))
         self._columns = Columns(wanted, wiring.columns, wiring.time)
@@ -235,7 +247,7 @@ class RowSource(Source):
         levels: dict[int, list[Level]] = {}
         for place, limit, switch in read.levels:
             levels.setdefault(place, []).append((limit, switch))
-        self._calibration = calibration_of(harness.taxel_settings)
+        self._calibration, self.reads_joints = taxels, bool(wiring.joints)
         self._levels = [levels.get(place, []) for place in range(len(self._taxel_names))]
         self.owned: Mask = sum(bit for *_, bit in self._switches)
         self.owned |= sum(1 << switch for each in self._levels for _, switch in each)
@@ -318,33 +330,30 @@ class RowSource(Source):
 
     def _known_us(self, sent_us: float, came_us: int, values: Sequence[float | None]) -> int | None:
         """Return our time of a row by its sender's clock; None if the row does not count, which is counted."""
-        counts = self.watch.counts
         if not abs(sent_us) <= _LATEST_US:  # nan, too
-            counts.untimed += 1
-            self._report(came_us, "rows come whose clock is missing, or no time, and are left out")
+            self._wrong(came_us, "untimed")
             return None
         if sent_us != self._clock.last_us:
             self._ticked_us = came_us
         elif came_us - self._ticked_us > self.longest_us:
             self._report(came_us, "its clock does not change from row to row, so rows count as old: " + _NO_TIME)
         if (sent_us, values) == self._last:
-            counts.repeated += 1
+            self.watch.counts.repeated += 1
             return None
-        known_us = self._clock.host_us(sent_us, came_us)
-        if known_us is None:
-            counts.restarts += 1
-            self._report(came_us, "its clock has restarted: was the board reset, or does another program send?")
+        found = self._clock.host_us(sent_us, came_us)
+        if found == "restarts":
+            self._wrong(came_us, found)
             self.watch.begin()
-            known_us = self._clock.host_us(sent_us, came_us)
-        if known_us == _LATE:
-            counts.late += 1
-            self._report(came_us, "rows come after later ones and are left out: do two programs send?")
-            return None
-        if known_us == _JUMPED:
-            counts.jumped += 1
-            self._report(came_us, "rows of another clock come and are left out: do two programs send?")
-            return None
-        return known_us
+            found = self._clock.host_us(sent_us, came_us)
+        if isinstance(found, int):
+            return found
+        self._wrong(came_us, found)
+        return None
+
+    def _wrong(self, came_us: int, what: str) -> None:
+        """Count a row whose clock is wrong, and report that."""
+        setattr(self.watch.counts, what, getattr(self.watch.counts, what) + 1)
+        self._report(came_us, _WRONG[what])
 
     def _report(self, came_us: int, fault: str) -> None:
         self._fault, self._fault_until_us = fault, came_us + _NOTICE_US
@@ -469,11 +478,6 @@ def steps_of(limits: Range) -> int:
     return int(span) if whole else _TAXEL_STEPS
 
 
-def stream_period_us(wiring: StreamWiring) -> int:
-    """Return the longest expected period of a stream, including the transport of a row on a good line."""
-    return max(SHORTEST_US, wiring.period_us) + _WAY_US // PERIODS
-
-
 class RowKind(SourceKind, frozen=True):
     """A kind of source that delivers rows.
 
@@ -485,23 +489,16 @@ class RowKind(SourceKind, frozen=True):
     reader: Callable[[StreamWiring], RowReader] | None = None
 
 
-def row_kinds(
-    name: str, help_: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
-) -> tuple[RowKind, RowKind]:
-    """Return a kind for streams with switches or taxels, and one for those with joints only."""
+def row_kind(
+    name: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
+) -> RowKind:
+    """Return a kind of source for the streams whose ports it takes."""
 
-    def kind(name: str, *, joints: bool) -> RowKind:
-        def sources(harness: Harness, names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
-            for number, wiring in enumerate(harness.streams):
-                if takes(wiring.port) and joints != bool(wiring.switches or wiring.taxels):
-                    yield RowSource(reader(wiring), harness, number, names, scan)
+    def sources(
+        harness: Harness, _names: Sequence[str], scan: ScanMap, taxels: TaxelCalibration | None
+    ) -> Iterator[Source]:
+        for number, wiring in enumerate(harness.streams):
+            if takes(wiring.port):
+                yield RowSource(reader(wiring), harness, number, scan, taxels)
 
-        def periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-            for wiring, read in zip(harness.streams, scan.streams, strict=True):
-                if takes(wiring.port) and (wiring.joints if joints else read.switches or read.levels):
-                    yield stream_period_us(wiring)
-
-        reads: Literal["joints", "switches"] = "joints" if joints else "switches"
-        return RowKind(name, help_, reads, sources, periods_us, rank, takes, reader)
-
-    return kind(name, joints=False), kind(f"{name} of joints", joints=True)
+    return RowKind(name, sources, rank, takes, reader)

@@ -9,6 +9,7 @@ from ..harness.wiring import Harness
 from ..published import Count
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import reading_of
+from ..taxels import TaxelCalibration
 from .base import Source, SourceKind, paced_us
 from .i2c import PortScanner
 
@@ -19,7 +20,7 @@ class SpiConverter(PortScanner):
     silent  whether the last replies were not a converter's
     """
 
-    def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
+    def __init__(self, harness: Harness, number: int, scan: ScanMap, taxels: TaxelCalibration | None = None) -> None:
         wiring, bus = harness.spi[number], len(harness.buses) + number
         ports = [port for port in scan.ports if port.bus == bus]
         self.name, self.part = f"spi at {wiring.device}", wiring.kind
@@ -28,7 +29,7 @@ class SpiConverter(PortScanner):
         self.device = SpiDevice(wiring.device, wiring.chip, wiring.clock_hz)
         self.run: Callable[[], list[int | None]] = self.device.prepare([reading_of(port, harness) for port in ports])
         self.silent = False
-        super().__init__(harness, bus, ports)
+        super().__init__(harness, bus, ports, taxels)
 
     def open(self) -> None:
         """Open the device."""
@@ -54,18 +55,12 @@ class SpiConverter(PortScanner):
         self.device.close()
 
 
-def _sources(harness: Harness, _names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
-    return (SpiConverter(harness, number, scan) for number in _numbers(harness, scan))
-
-
-def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-    return (paced_us(harness.spi[number].rate_hz) for number in _numbers(harness, scan))
-
-
-def _numbers(harness: Harness, scan: ScanMap) -> list[int]:
-    """Return the numbers of the SPI devices that are read."""
+def _sources(
+    harness: Harness, _names: Sequence[str], scan: ScanMap, taxels: TaxelCalibration | None
+) -> Iterator[Source]:
     buses = len(harness.buses)
-    return sorted({port.bus - buses for port in scan.ports if port.bus >= buses})
+    numbers = sorted({port.bus - buses for port in scan.ports if port.bus >= buses})
+    return (SpiConverter(harness, number, scan, taxels) for number in numbers)
 
 
-MEMBER = SourceKind("spi", "Converters on SPI: [[spi]].", "switches", _sources, _periods_us, rank=2)
+MEMBER = SourceKind("spi", _sources, rank=2)

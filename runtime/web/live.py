@@ -239,7 +239,7 @@ class FrameText:
 
     def _pressed(self, codes: Sequence[int | None]) -> dict[str, float]:
         return {
-            line.name: round(min(max((code - line.rest) / (line.press - line.rest), 0.0), 1.0), 3)
+            line.name: round(min(max((code - line.raw_a) / (line.raw_b - line.raw_a), 0.0), 1.0), 3)
             for code, line in zip(codes, self._taxels, strict=True)
             if code is not None and line is not None
         }

@@ -74,7 +74,8 @@ class Performance:
     def with_rests(self, ends: NDArray[np.intp], rest_us: int) -> "Performance":
         """Return it with a straight, empty hand for `rest_us`, in whole frames, after each of the frames `ends`."""
         at = np.repeat(ends + 1, max(-(-rest_us // self.period_us), 1))
-        lines = {} if self.taxel_calibration is None else {one.name: one.rest for one in self.taxel_calibration.taxels}
+        pads = self.taxel_calibration
+        lines = {} if pads is None else {one.name: one.raw_a for one in pads.sensors}
         return replace(
             self,
             switches=np.insert(self.switches, at, False, axis=0),
@@ -244,8 +245,8 @@ def _taxel_calibration(columns: tuple[Joint, ...]) -> TaxelCalibration | None:
             raise SceneError(
                 f"taxel {taxel.name!r}: its codes cannot be a converter's counts of {meant[0].unit}: none of them is 0"
             )
-        lines.append(TaxelLine(taxel.name, rest, press, value))
-    return TaxelCalibration(unit=meant[0].unit, taxels=tuple(lines))
+        lines.append(TaxelLine(taxel.name, rest, 0.0, press, value))
+    return TaxelCalibration(unit=meant[0].unit, sensors=tuple(lines))
 
 
 def _nearest(rising: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.intp]:

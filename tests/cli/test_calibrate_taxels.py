@@ -12,7 +12,10 @@ import pytest
 from thenar.cli.calibrate_command import TypedLines
 from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine, load_taxel_calibration
+from thenar.runtime.calibration import load_lines
+from thenar.runtime.taxels import TaxelCalibration
+
+from ..gloves import pad_line
 
 HANGING_S = 60.0
 PADS = ("p0", "p1", "p2")
@@ -68,8 +71,9 @@ def test_rest_and_press_are_learnt_except_of_taxels_never_pressed(tmp_path: Path
     code, said = calibrated(tmp_path, [(800, 900, 503), (40, 120, 500)], "--newtons", "2.5", "--subject", "anna")
     assert code == 0, said
     assert "Not calibrated, because they did not move: p2" in said
-    lines = (TaxelLine("p0", 40, 800, 2.5), TaxelLine("p1", 900, 120, 2.5))
-    assert load_taxel_calibration(tmp_path / "pads.toml") == TaxelCalibration(subject="anna", unit="N", taxels=lines)
+    lines = (pad_line("p0", 40, 800, 2.5), pad_line("p1", 900, 120, 2.5))
+    found = load_lines(tmp_path / "pads.toml", TaxelCalibration)
+    assert found == TaxelCalibration(subject="anna", unit="N", sensors=lines)
 
 
 def test_where_nothing_moves_nothing_is_written(tmp_path: Path) -> None:

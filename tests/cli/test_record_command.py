@@ -23,9 +23,10 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.lines import BoardSender
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.recording.guide import planned, read_journal
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine
+from thenar.runtime.taxels import TaxelCalibration
 from thenar.studio.edits import change, load_edits
 
+from ..gloves import pad_line
 from .conftest import refusal
 
 # Collections over ptys, in real time.
@@ -254,7 +255,7 @@ def test_pads_are_recorded_with_the_rest(
 ) -> None:
     taxels = 'taxels = { p0 = [0, 1023], p1 = [0, 1023] }\n[taxels]\ncalibration = "pads.toml"\n'
     (folder / "glove.toml").write_text(GLOVE.format(folder=folder) + taxels)
-    (folder / "pads.toml").write_text(TaxelCalibration(unit="N", taxels=(TaxelLine("p0", 100, 900, 2.0),)).to_toml())
+    (folder / "pads.toml").write_text(TaxelCalibration(unit="N", sensors=(pad_line("p0", 100, 900, 2.0),)).to_toml())
     board.show({"p0": 500, "p1": 40})
     terminal = start("--seed", "5", "--no-none")
     terminal.until(rb"Enter: start the countdown")

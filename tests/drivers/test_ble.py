@@ -17,7 +17,7 @@ from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.sources import DeviceThread
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.base import SOURCES
+from thenar.runtime.sources.base import sources_of
 
 from . import bumble_backend
 from .test_transports import LONG_S, heard
@@ -84,7 +84,7 @@ def test_what_is_missing_is_said(glove: EmulatedPeripheral, monkeypatch: pytest.
 def test_a_stream_by_bluetooth_is_read_again_when_it_returns(glove: EmulatedPeripheral) -> None:
     text = '[[stream]]\nport = "ble://My Glove"\njoints = { flex = [0, 254] }\ncolumns = ["flex"]\n'
     harness, frames = parse_harness(text, "glove.toml"), Queue[SwitchFrame | GloveFrame]()
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, (), whole_scan(harness, ())))
+    (source,) = sources_of(harness, (), whole_scan(harness, ()))
     keeper = DeviceThread("glove", source, frames.put)
     keeper.start()
     try:

@@ -25,8 +25,9 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.sources.rows import _Grid, steps_of
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine, count_limit
+from thenar.runtime.taxels import TaxelCalibration, count_limit
 
+from ..gloves import pad_line
 from ..tables import calibrated_glove, code_of, grid_code
 
 SharedLibrary = Callable[..., ctypes.CDLL]
@@ -293,14 +294,14 @@ def test_a_taxel_s_levels_close_as_a_run_closes_them(
     coded = Calibration(0, "pad", "N" if calibrated else "counts", *points)
     levels = [Threshold(code, 0.0, coded) for code in (90, 400, 1000)]
     switches = [Switch(0, "s0", 0.0), *(Switch(1, f"level {n}", 0.0, level) for n, level in enumerate(levels))]
-    (tmp_path / "pads.toml").write_text(TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 900, 222, 2.5),)).to_toml())
+    (tmp_path / "pads.toml").write_text(TaxelCalibration(unit="N", sensors=(pad_line("pad", 900, 222, 2.5),)).to_toml())
     settings = '[taxels]\ncalibration = "pads.toml"\n' if calibrated else ""
     (tmp_path / "glove.toml").write_text(STREAM + settings)
     harness = load_harness(tmp_path / "glove.toml")
     names = names_of([joint("a", "raw", (1, 1.0, 255, 255.0))], switches)
     sensors = sensors_of(names, harness)
     codes = compiled(names, sensors, take="return hand.switches[0];")
-    lines = TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 900, 222, 2.5),)) if calibrated else None
+    lines = TaxelCalibration(unit="N", sensors=(pad_line("pad", 900, 222, 2.5),)) if calibrated else None
     grid = _Grid((0, 1023), 0, steps_of((0, 1023)))
     for reading in range(-3, 1030):
         count = min(max(grid.code(reading), 0), 1023)

@@ -20,7 +20,7 @@ from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Line
 from thenar.runtime.published import Count, DeviceHealth, HealthReport, JointAngles, LiveGrasp, Preshape, Quarantined
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.base import SOURCES
+from thenar.runtime.sources.base import sources_of
 from thenar.runtime.sources.rows import RowSource
 
 from ..conftest import lacking
@@ -71,7 +71,7 @@ def row_source(glove: str) -> RowSource:
     """Return the one source of a glove with one stream, for all switches and taxels."""
     harness = parse_harness(glove, "glove.toml")
     scan = whole_scan(harness, harness.switches, every_taxel=True)
-    (source,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    (source,) = sources_of(harness, harness.switches, scan)
     assert isinstance(source, RowSource)
     return source
 

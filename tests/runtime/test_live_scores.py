@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from thenar.runtime.errors import FrameError
 from thenar.runtime.model.integers import IntegerTables
-from thenar.runtime.scores import Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
+
+from .test_scorer import summed
 
 MakeTables = Callable[..., IntegerTables]
 
@@ -22,17 +24,16 @@ def flags(mask: int, count: int) -> np.ndarray:
 def test_any_state_has_the_scores_of_the_whole_frame(
     make_tables: MakeTables, data: st.DataObject, classes: int, switches: int, joints: int
 ) -> None:
-    scorer, masks = Scorer(make_tables(3, classes, switches, joints)), st.integers(0, (1 << switches) - 1)
+    tables, masks = make_tables(3, classes, switches, joints), st.integers(0, (1 << switches) - 1)
+    scorer = Scorer(tables)
     closed, lost = data.draw(masks), data.draw(st.just(0) | masks)
     several = st.lists(st.integers(0, 260) | st.just(65535), min_size=joints, max_size=joints)
     codes, lost_joints = data.draw(st.none() | several), data.draw(st.just(0) | st.integers(0, (1 << joints) - 1))
-    expected = scorer.biased_scores_without(
-        flags(closed, switches),
-        [0] * joints if codes is None else codes,
-        flags(lost, switches),
-        np.full(joints, True) if codes is None else flags(lost_joints, joints),
-    )
-    assert scorer.state_scores(closed, lost, codes, lost_joints) == expected
+    absent = np.full(joints, True) if codes is None else flags(lost_joints, joints)
+    measured = np.array([0] * joints if codes is None else codes, np.uint16)
+    expected = summed(tables, flags(closed, switches), measured, flags(lost, switches), absent)
+    found = np.array(scorer.state_scores(closed, lost, codes, lost_joints)) - LANE_OFFSET
+    assert found.tolist() == expected.tolist()
 
 
 @pytest.mark.parametrize("sign", [+1, -1])
@@ -43,7 +44,8 @@ def test_changes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
     tables = IntegerTables.of(rows(0, 7)[0], rows(32767, -32760), (), (), rows(-1, 1), rows(), 1.0)
     scorer = Scorer(tables)
     for closed, lost in [(1, 0), (0, 1), (1, 1), (0, 0), (1, 0)]:
-        assert scorer.state_scores(closed, lost, []) == scorer.biased_scores_without([closed], [], [lost], [])
+        row = tables.switch_means[0] if lost else closed * tables.switch_rows[0]
+        assert scorer.state_scores(closed, lost, []) == tuple((tables.bias.astype(int) + row + LANE_OFFSET).tolist())
 
 
 @pytest.mark.parametrize(("closed", "lost"), [(1 << 9, 0), (0, 1 << 9), (-1, 0), (0, -1)])

@@ -19,7 +19,7 @@ from thenar.runtime.live.stream_probe import propose_glove
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sinks import open_sink
-from thenar.runtime.sources.base import SOURCES
+from thenar.runtime.sources.base import sources_of
 from thenar.runtime.sources.osc import OscParser, OscReader
 from thenar.runtime.sources.rows import RowSource
 
@@ -102,7 +102,7 @@ def source() -> Iterator[RowSource]:
         port = free.getsockname()[1]
     harness = parse_harness(GLOVE.format(port=f"osc:127.0.0.1:{port}/glove"), "glove.toml")
     scan = whole_scan(harness, harness.switches)
-    (made,) = (one for kind in SOURCES.values() for one in kind.sources(harness, harness.switches, scan))
+    (made,) = sources_of(harness, harness.switches, scan)
     assert isinstance(made, RowSource)
     made.open()
     yield made

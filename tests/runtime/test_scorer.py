@@ -14,7 +14,7 @@ MakeTables = Callable[..., IntegerTables]
 Drawn = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def _sum(
+def summed(
     tables: IntegerTables,
     bits: Iterable[bool],
     codes: Iterable[int],
@@ -48,9 +48,9 @@ def test_scores_are_the_sum_of_the_rows(
     bits, codes, lost_bits, lost_codes = data.draw(frames(switches, joints))
     scorer, none = Scorer(tables), [False] * (switches + joints)
     whole = np.array(scorer.biased_scores(bits, codes)) - LANE_OFFSET
-    assert np.array_equal(whole, _sum(tables, bits, codes, none[:switches], none[:joints]))
+    assert np.array_equal(whole, summed(tables, bits, codes, none[:switches], none[:joints]))
     degraded = np.array(scorer.biased_scores_without(bits, codes, lost_bits, lost_codes)) - LANE_OFFSET
-    assert np.array_equal(degraded, _sum(tables, bits, codes, lost_bits, lost_codes))
+    assert np.array_equal(degraded, summed(tables, bits, codes, lost_bits, lost_codes))
 
 
 def test_a_code_equal_to_a_threshold_goes_left_of_it(make_tables: MakeTables) -> None:

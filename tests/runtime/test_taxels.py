@@ -6,6 +6,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import SettingError
+from thenar.runtime.calibration import load_lines
+from thenar.runtime.code_line import code_line
 from thenar.runtime.manifest import Calibration, Switch, Threshold
 from thenar.runtime.scanning.scanmap import Port, ScanMap, StreamRead
 from thenar.runtime.taxels import (
@@ -15,12 +17,13 @@ from thenar.runtime.taxels import (
     count_limit,
     in_counts,
     learnt_lines,
-    load_taxel_calibration,
 )
+
+from ..gloves import pad_line
 
 COUNTS = Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0)
 NEWTONS = Calibration(0, "pad", "N", 10, 0.0, 210, 2.0)
-RISING, FALLING = TaxelLine("pad", 100, 900), TaxelLine("pad", 900, 100)
+RISING, FALLING = pad_line("pad", 100, 900), pad_line("pad", 900, 100)
 
 counts = st.integers(0, 65535)
 
@@ -28,12 +31,12 @@ counts = st.integers(0, 65535)
 def lines(name: str = "pad") -> st.SearchStrategy[TaxelLine]:
     ends = st.tuples(counts, counts).filter(lambda both: both[0] != both[1])
     return st.builds(
-        lambda both, value: TaxelLine(name, both[0], both[1], value), ends, st.floats(0.01, 100, allow_nan=False)
+        lambda both, value: pad_line(name, both[0], both[1], value), ends, st.floats(0.01, 100, allow_nan=False)
     )
 
 
 def taxel(line: TaxelLine | None, *limits: int) -> LiveTaxel:
-    calibration = None if line is None else TaxelCalibration(taxels=(line,))
+    calibration = None if line is None else TaxelCalibration(sensors=(line,))
     levels = [(limit, number) for number, limit in enumerate(limits)]
     return LiveTaxel("pad", levels, calibration, highest=1023)
 
@@ -54,10 +57,10 @@ def test_a_level_is_decided_as_the_build_codes_values(
 ) -> None:
     coded = Calibration(0, "pad", "N", points[0], 0.0, points[1], value)
     try:
-        codes = line.codes(coded)
+        codes = code_line(coded, line)
     except SettingError:
         assume(False)
-    limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", taxels=(line,)))
+    limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", sensors=(line,)))
     edge = limit if limit >= 0 else ~limit
     for raw in {*tried, *(near for near in (edge - 1, edge, edge + 1, 0, 65535) if 0 <= near < 65536)}:
         assert closes(limit, raw) == (codes.code(raw) > code)
@@ -73,9 +76,9 @@ def test_codes_that_are_no_counts_need_a_calibration() -> None:
     with pytest.raises(SettingError, match=r"coded in 'N', not in counts.*thenar calibrate --taxels"):
         count_limit(threshold, None)
     with pytest.raises(SettingError, match="calibration lacks it"):
-        count_limit(threshold, TaxelCalibration(unit="N", taxels=(TaxelLine("other", 1, 2),)))
+        count_limit(threshold, TaxelCalibration(unit="N", sensors=(pad_line("other", 1, 2),)))
     with pytest.raises(SettingError, match="calibrated in 'press', but 'pad' of the build is in 'N'"):
-        count_limit(threshold, TaxelCalibration(taxels=(RISING,)))
+        count_limit(threshold, TaxelCalibration(sensors=(RISING,)))
 
 
 @pytest.mark.parametrize(
@@ -93,7 +96,7 @@ def test_codes_that_are_no_counts_need_a_calibration() -> None:
     ],
 )
 def test_ends_of_the_converter(rest: int, press: int, raw: int, found: str) -> None:
-    pad = taxel(TaxelLine("pad", rest, press), 500)
+    pad = taxel(pad_line("pad", rest, press), 500)
     closed, lost = pad.read(raw)
     assert (pad.fault, lost) == (found, 1 if found else 0)
     assert not closed & lost
@@ -108,33 +111,36 @@ def test_what_could_not_be_read_is_lost_and_the_rest_is_not() -> None:
 
 
 def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:
-    written = TaxelCalibration(subject="anna", unit="N", taxels=(TaxelLine("a", 3, 800, 2.5), TaxelLine("b", 900, 80)))
+    written = TaxelCalibration(subject="anna", unit="N", sensors=(pad_line("a", 3, 800, 2.5), pad_line("b", 900, 80)))
     file = tmp_path / "anna.toml"
     file.write_text(written.to_toml())
-    assert load_taxel_calibration(file) == written
+    assert load_lines(file, TaxelCalibration) == written
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("sensor", "said"),
     [
-        ("taxel = [{name = 'a', rest = 5, press = 5}]", "rest and press are both 5"),
-        ("taxel = [{name = 'a', rest = 5, press = 9, value = 0.0}]", "a number above 0"),
-        ("taxel = [{name = 'a', rest = 5, press = 9, value = nan}]", r"taxel\[0\]\.value: must be a finite number"),
-        ("taxel = [{name = 'a', rest = 5, press = 9}, {name = 'a', rest = 1, press = 2}]", "calibrated twice: a"),
-        ("taxel = [{name = 'a', rest = 5, press = 70000}]", "press"),
-        ("taxel = [{name = '', rest = 5, press = 7}]", "name"),
+        ({"raw_b": "5"}, "raw_a and raw_b are both 5, which makes no line"),
+        ({"value_b": "0.0"}, "rest and press have one value"),
+        ({"value_b": "nan"}, r"sensor\[0\]\.value_b: must be a finite number"),
+        ({"value_b": "1.0}, {name = 'a', raw_a = 1, value_a = 0.0, raw_b = 2, value_b = 1.0"}, "calibrated twice"),
+        ({"raw_b": "70000"}, "raw_b"),
+        ({"name": "''"}, "name"),
     ],
 )
-def test_a_wrong_calibration_is_refused(tmp_path: Path, text: str, said: str) -> None:
-    file = tmp_path / "wrong.toml"
-    file.write_text(text)
+def test_a_wrong_calibration_is_refused(tmp_path: Path, sensor: dict[str, str], said: str) -> None:
+    file, usual = (
+        tmp_path / "wrong.toml",
+        {"name": "'a'", "raw_a": "5", "value_a": "0.0", "raw_b": "9", "value_b": "1.0"},
+    )
+    file.write_text(f"sensor = [{{{', '.join(f'{key} = {value}' for key, value in (usual | sensor).items())}}}]")
     with pytest.raises(SettingError, match=said):
-        load_taxel_calibration(file)
+        load_lines(file, TaxelCalibration)
 
 
 def test_the_value_of_a_press_is_a_finite_number() -> None:
-    with pytest.raises(SettingError, match="the value of a press must be a number above 0, not nan"):
-        TaxelLine("a", 5, 9, math.nan)
+    with pytest.raises(SettingError, match="value_a and value_b must be finite numbers"):
+        pad_line("a", 5, 9, math.nan)
 
 
 @given(
@@ -149,11 +155,11 @@ def test_rest_and_press_are_learnt_though_there_are_glitches(
     rested = [(rest - noise,), (rest,), (rest,), (rest + noise,), (rest,), (None,)]
     pressed = [(code,) for code in (*[rest] * 9, *glitches, *[rest] * 9, *[press] * 9, *[rest] * 9)]
     moved = abs(press - rest) >= max(10, 6 * noise)
-    assert learnt_lines(["pad"], rested, pressed, 2.0) == ((TaxelLine("pad", rest, press, 2.0),) if moved else ())
+    assert learnt_lines(["pad"], rested, pressed, 2.0) == ((pad_line("pad", rest, press, 2.0),) if moved else ())
 
 
 def test_a_taxel_that_was_never_read_is_not_learnt() -> None:
-    assert learnt_lines(["a", "b"], [(None, 5)], [(None, 500)] * 9, 1.0) == (TaxelLine("b", 5, 500),)
+    assert learnt_lines(["a", "b"], [(None, 5)], [(None, 500)] * 9, 1.0) == (pad_line("b", 5, 500),)
 
 
 def test_a_scan_map_is_turned_into_counts() -> None:
@@ -161,7 +167,7 @@ def test_a_scan_map_is_turned_into_counts() -> None:
     port = Port(0, 0, "CH3", (), True, ((60, 1),))
     ports = (port, Port(0, 1, "A", ((0, 0),), False))
     scan = ScanMap(1, ports, (StreamRead((), ((3, 60, 1),)),))
-    counted = in_counts(scan, switches, TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 100, 900, 2.0),)))
+    counted = in_counts(scan, switches, TaxelCalibration(unit="N", sensors=(pad_line("pad", 100, 900, 2.0),)))
     # Above 0.5 N by half a code of 0.01 N, of 400 counts a newton.
     assert counted.ports[0].levels == ((302, 1),)
     assert counted.streams == (StreamRead((), ((3, 302, 1),)),)

@@ -12,9 +12,9 @@ from thenar.drivers.calibration import FLAT, POSES
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.calibration import load_calibration
+from thenar.runtime.calibration import load_calibration, load_lines
 from thenar.runtime.harness.loading import load_harness
-from thenar.runtime.taxels import load_taxel_calibration
+from thenar.runtime.taxels import TaxelCalibration
 from thenar.studio.studio import Studio
 
 from ..browser import Browser
@@ -192,8 +192,8 @@ def test_pads_are_calibrated_and_named_in_the_harness(
     key(browser, "accept")
     browser.wait(lambda: browser.text("calibrated"))
     assert browser.text("calibrated") == "taxels.toml: 1 of 1 are calibrated"
-    (pad,) = load_taxel_calibration(folder / "taxels.toml").taxels
-    assert (pad.rest, pad.press) == (100, 900)
+    (pad,) = load_lines(folder / "taxels.toml", TaxelCalibration).sensors
+    assert (pad.raw_a, pad.raw_b) == (100, 900)
     text = (folder / "glove.toml").read_text()
     assert text.startswith("# Mine.\n")
     assert load_harness(folder / "glove.toml").taxel_settings.calibration == str((folder / "taxels.toml").resolve())

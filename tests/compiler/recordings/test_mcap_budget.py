@@ -62,11 +62,12 @@ def record(opcode: int, content: bytes) -> bytes:
 
 
 def described(session: Session, **texts: str) -> bytes:
-    """Return the session's record, with `texts` in place of its own."""
+    """Return the session's record, with JSON `texts` in place of its own fields."""
+    metadata = to_metadata(session)
+    fields = {name: JSON(value).decode() for name, value in msgspec.json.decode(metadata["session"]).items()} | texts
+    metadata["session"] = "{" + ",".join(f'"{name}":{text}' for name, text in fields.items()) + "}"
     pairs = b"".join(
-        pack("<I", len(part)) + part
-        for pair in ({**to_metadata(session), **texts}).items()
-        for part in (text.encode() for text in pair)
+        pack("<I", len(part)) + part for pair in metadata.items() for part in (text.encode() for text in pair)
     )
     return record(12, pack("<I", 6) + b"thenar" + pack("<I", len(pairs)) + pairs)
 

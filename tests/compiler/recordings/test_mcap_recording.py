@@ -19,7 +19,9 @@ from thenar.runtime.manifest import Calibration, Threshold
 from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.taxels import LiveTaxel, TaxelCalibration, TaxelLine, count_limit
+from thenar.runtime.taxels import LiveTaxel, TaxelCalibration, count_limit
+
+from ...gloves import pad_line
 
 SENSORS = ("thumb_mpj", "index_mpj", "wrist_pitch", "wrist_yaw")
 CALIBRATION = GloveCalibration(
@@ -278,7 +280,7 @@ def test_a_calibration_that_lacks_a_sensor_is_named(write: Write) -> None:
         import_recordings([write(session=replace(SESSION, calibration=lacking))])
 
 
-PADS = TaxelCalibration(unit="N", taxels=(TaxelLine("p", 100, 900, 2.0), TaxelLine("q", 900, 100)))
+PADS = TaxelCalibration(unit="N", sensors=(pad_line("p", 100, 900, 2.0), pad_line("q", 900, 100)))
 ANALOG = replace(SESSION, switches=("s1",), sensors=(), taxels=("p", "q"), taxel_calibration=PADS)
 
 
@@ -313,14 +315,14 @@ def test_trials_with_unread_taxels_are_left_out_and_reported(tmp_path: Path) -> 
 def test_codes_of_another_calibration_are_those_that_the_live_recogniser_gives_it(
     raw: int, code: int, of_build: bool
 ) -> None:
-    own = TaxelLine("p", 800, 300, 1.7)
-    first = PADS.taxels[0]
-    coded = Calibration(0, "p", "N", first.rest, 0.0, first.press, first.value)
-    limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", taxels=(own,)))
+    own = pad_line("p", 800, 300, 1.7)
+    first = PADS.sensors[0]
+    coded = Calibration(0, "p", "N", first.raw_a, 0.0, first.raw_b, first.value_b)
+    limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", sensors=(own,)))
     closed, _ = LiveTaxel("p", [(limit, 0)]).read(raw)
     grasps = [
         (
-            _Part("", replace(ANALOG, taxel_calibration=TaxelCalibration(unit="N", taxels=(line,))), COLLECTION, ()),
+            _Part("", replace(ANALOG, taxel_calibration=TaxelCalibration(unit="N", sensors=(line,))), COLLECTION, ()),
             grasp,
         )
         for line, grasp in (
@@ -331,7 +333,7 @@ def test_codes_of_another_calibration_are_those_that_the_live_recogniser_gives_i
     # In the coding of the first session, or in that of a build, for which a single session is enough.
     codes, taxel = _taxel(0, grasps[of_build:], {"p": coded} if of_build else {})
     assert (codes[-1] > code) == bool(closed)
-    assert taxel == Joint("p", "N", first.rest, 0.0, first.press, first.value)
+    assert taxel == Joint("p", "N", first.raw_a, 0.0, first.raw_b, first.value_b)
 
 
 @given(

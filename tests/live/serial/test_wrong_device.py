@@ -84,7 +84,7 @@ def device(kind: str, port: Path) -> GloveDevice | RowSource:
         return GloveDevice(GloveWiring(port=str(port)))
     harness = Harness(name="wrong", streams=(StreamWiring(port=str(port), rate_hz=100.0, switches=NAMES),))
     wired = harness.streams[0]
-    return RowSource(LineReader(wired.port, wired.baud), harness, 0, NAMES, whole_scan(harness, NAMES))
+    return RowSource(LineReader(wired.port, wired.baud), harness, 0, whole_scan(harness, NAMES))
 
 
 def lead(link: Path, line: PtyLine) -> None:

@@ -14,7 +14,9 @@ from thenar.runtime.live.replay import recognised
 from thenar.runtime.manifest import Calibration, Switch, Threshold
 from thenar.runtime.recording.session import Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine
+from thenar.runtime.taxels import TaxelCalibration
+
+from ...gloves import pad_line
 
 HARNESS = """
 [[stream]]
@@ -23,7 +25,7 @@ switches = ["a", "b"]
 taxels = { pad = [0, 1023], heel = [0, 1023] }
 """
 NEWTONS = Calibration(0, "pad", "N", 0, 0.0, 100, 1.0)
-LINE = TaxelLine("pad", 100, 900, 2.0)
+LINE = pad_line("pad", 100, 900, 2.0)
 
 
 @pytest.fixture
@@ -36,7 +38,7 @@ def pressed(make_build: Callable[..., Build]) -> Build:
 
 def record(path: Path, frames: list[SwitchFrame], **changes: Any) -> Path:
     session = Session(thenar="0", harness=HARNESS, switches=("a", "b"), sensors=(), taxels=("pad", "heel"))
-    calibration = TaxelCalibration(unit="N", taxels=(LINE,))
+    calibration = TaxelCalibration(unit="N", sensors=(LINE,))
     with Recorder(path, replace(session, taxel_calibration=calibration, **changes)) as recorder:
         for frame in frames:
             recorder.frame(frame)

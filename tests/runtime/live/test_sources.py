@@ -1,6 +1,7 @@
 """Devices that are kept, and what arrives of them, joined."""
 
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from queue import Queue
 from threading import Event, Thread
 
@@ -11,12 +12,18 @@ from hypothesis import strategies as st
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
+from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.live import sources as module
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.live.sources import DeviceThread, FrameBuffer
+from thenar.runtime.live.sources import DeviceThread, FrameBuffer, Sources
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.base import Source
+from thenar.runtime.taxels import TaxelCalibration
+
+from ...gloves import pad_line
+from ...sending import datagrams, free_port
 
 MakeBuild = Callable[..., Build]
 PERIOD_US = 10_000_000
@@ -331,3 +338,19 @@ def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.Lo
         assert kept.next_change() == (False, "ZeroDivisionError: oops")
     assert kept.keeper.faults == 3
     assert len([record for record in caplog.records if record.exc_info]) == 1
+
+
+def test_devices_know_the_calibration_of_taxels_that_glove_toml_names(tmp_path: Path) -> None:
+    lines = (pad_line("pad", rest=50, press=600),)
+    (tmp_path / "taxels.toml").write_text(TaxelCalibration(sensors=lines).to_toml())
+    text = 'columns = ["pad"]\ntaxels = { pad = [0, 1023] }\n[taxels]\ncalibration = "taxels.toml"\n'
+    (tmp_path / "glove.toml").write_text(f'[[stream]]\nport = "udp://127.0.0.1:{(port := free_port())}"\n{text}')
+    harness = load_harness(tmp_path / "glove.toml")
+    with (
+        Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources,
+        datagrams(port, lambda _: b"1023\n"),
+    ):
+        while (frame := sources.take().switches) is None:
+            pass
+        assert frame.taxels == (1023,)
+        assert sources.health()[0].error == "taxels with faults: pad: saturated"

@@ -13,6 +13,7 @@ from struct import unpack
 from threading import Event
 from zlib import crc32
 
+import msgspec
 import pytest
 from mcap.reader import make_reader
 from mcap.records import Message
@@ -25,12 +26,14 @@ from thenar.runtime.errors import FormatError, FrameError
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.layout import Tail
+from thenar.runtime.recording.layout import CHANNELS, Tail
 from thenar.runtime.recording.mcap import LARGEST_RECORD
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine
+from thenar.runtime.taxels import TaxelCalibration
+
+from ...gloves import pad_line
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label
 Record = Callable[[Recorder, Entry], None]
@@ -69,13 +72,14 @@ def test_the_mcap_library_reads_it_by_its_summary_and_checks_its_checksums(recor
             "/thenar/grasp": 2,
             "/thenar/recognition": 2,
             "/thenar/trials": 2,
+            "/thenar/taxels": 0,
         }
         numbers = summary.statistics
-        assert (numbers.message_count, numbers.schema_count, numbers.channel_count) == (12, 2, 5)
+        assert (numbers.message_count, numbers.schema_count, numbers.channel_count) == (12, 2, 6)
         assert (numbers.metadata_count, numbers.attachment_count, numbers.chunk_count) == (1, 0, 0)
         [metadata] = reader.iter_metadata()
         assert metadata.name == "thenar"
-        assert metadata.metadata["harness"] == 'name = "bänk"\n'
+        assert msgspec.json.decode(metadata.metadata["session"])["harness"] == 'name = "bänk"\n'
     with recording.open("rb") as file:
         messages = [record for record in StreamReader(file, validate_crcs=True).records if isinstance(record, Message)]
     assert summary.statistics.message_start_time == messages[0].log_time
@@ -172,7 +176,7 @@ def test_nobody_else_may_read_a_recording(tmp_path: Path, session: Session) -> N
 def test_a_glove_whose_description_no_reader_would_take_is_refused(tmp_path: Path, session: Session) -> None:
     with pytest.raises(SettingError, match="and at most 16777216 are recorded: shorten glove"):
         Recorder(tmp_path / "a.mcap", replace(session, harness="#" * LARGEST_RECORD))
-    with pytest.raises(SettingError, match="this cannot be recorded: its metadata 'sensors' cannot be read"):
+    with pytest.raises(SettingError, match=r"this cannot be recorded: its session cannot be read: .*sensors"):
         Recorder(tmp_path / "a.mcap", replace(session, sensors=tuple(f"j{number}" for number in range(256))))
     assert not list(tmp_path.iterdir())
 
@@ -349,7 +353,7 @@ def test_a_killed_process_has_recorded_all_that_it_said_it_had(tmp_path: Path, a
     assert len(found) >= said
 
 
-def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, session: Session) -> None:
+def test_taxels_have_a_topic_in_every_recording(tmp_path: Path, session: Session) -> None:
     def topics(path: Path) -> dict[str, int]:
         with path.open("rb") as file:
             summary = make_reader(file, validate_crcs=True).get_summary()
@@ -360,8 +364,8 @@ def test_taxels_have_a_topic_only_where_they_are_recorded(tmp_path: Path, sessio
 
     with Recorder(tmp_path / "plain.mcap", session):
         pass
-    assert "/thenar/taxels" not in topics(tmp_path / "plain.mcap")
-    analog = replace(session, taxels=("p", "q"), taxel_calibration=TaxelCalibration(taxels=(TaxelLine("p", 1, 9),)))
+    assert topics(tmp_path / "plain.mcap") == {topic: 0 for topic, _ in CHANNELS.values()}
+    analog = replace(session, taxels=("p", "q"), taxel_calibration=TaxelCalibration(sensors=(pad_line("p", 1, 9),)))
     path, frames = tmp_path / "a.mcap", [SwitchFrame(time_us, 1, taxels=(time_us, 3)) for time_us in (5, 6)]
     with Recorder(path, analog):
         pass

@@ -51,7 +51,7 @@ def test_a_taxels_levels_share_one_conversion(kept: list[str]) -> None:
     measured = [port for port in scan.ports if port.levels]
     assert len(measured) == len(taxels - {"t6"})
     for port in measured:
-        chip = MIXED.chip_of(port.bus, port.chip)
+        chip = MIXED.wires[port.bus].chips[port.chip]
         taxel = chip.numbered_pins[chip.chip.pins.index(port.reading)]
         assert {kept[number]: code for code, number in port.levels} == {
             name: int(name.split(">")[1]) for name in kept if name.startswith(f"{taxel}>")

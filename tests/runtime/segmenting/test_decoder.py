@@ -10,7 +10,7 @@ from hypothesis.strategies import DrawFn
 from numpy.typing import NDArray
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.segmenting.decoder import Decoder
+from thenar.runtime.segmenting.decoder import Decoder, frame_costs
 from thenar.runtime.segmenting.model import SegmentModel
 
 Segments = list[tuple[int, int]]
@@ -18,7 +18,7 @@ Segments = list[tuple[int, int]]
 
 def costs_of(model: SegmentModel, lanes: NDArray[np.int64], refused: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the costs of frames, (T, K + 1)."""
-    return np.array([model.costs(row, no) for row, no in zip(lanes.tolist(), refused.tolist(), strict=True)])
+    return np.array([frame_costs(model, row, no) for row, no in zip(lanes.tolist(), refused.tolist(), strict=True)])
 
 
 def decoded(model: SegmentModel, lanes: NDArray[np.int64], refused: NDArray[np.bool_]) -> list[int]:

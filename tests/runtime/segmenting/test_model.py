@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.errors import BuildError
-from thenar.runtime.segmenting.decoder import _NEVER, Decoder
+from thenar.runtime.segmenting.decoder import _NEVER, Decoder, frame_costs
 from thenar.runtime.segmenting.model import LARGEST, SegmentModel, gain_of
 
 _USUAL = SegmentModel.usual(3, True, 100.0)
@@ -67,7 +67,7 @@ def test_frames_cost_what_the_text_says(
         by_hand = [min(((max(row) - lane) >> shift) * gain // 256, most) for lane in row]
         if refusal is not None:
             by_hand = [cost + refusal * no for cost in by_hand] + [0 if no else refusal]
-        assert model.costs(row, no) == by_hand
+        assert frame_costs(model, row, no) == by_hand
 
 
 @given(st.data())

@@ -10,7 +10,7 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources import i2c as module
-from thenar.runtime.sources.base import slowest_us
+from thenar.runtime.sources.base import slowest_us, sources_of
 from thenar.runtime.sources.i2c import I2cDevice
 
 MakeBuild = Callable[..., Build]
@@ -107,7 +107,7 @@ def test_a_bus_is_scanned_at_its_rate(bench: Bench, rate_hz: float, scans: int) 
 def test_a_slow_bus_is_expected_at_its_rate(bench: Bench, rate_hz: float, period_us: int) -> None:
     made = device(OFF, rate_hz)
     assert (made.period_us, made.longest_us) == (period_us, 2 * period_us)
-    assert slowest_us(harness(OFF, rate_hz), SCAN, "switches") == period_us
+    assert slowest_us(sources_of(harness(OFF, rate_hz), NAMES, SCAN)) == period_us
 
 
 def test_a_late_scan_is_not_made_up_for(bench: Bench) -> None:

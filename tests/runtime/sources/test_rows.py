@@ -15,7 +15,7 @@ from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources import rows as module
-from thenar.runtime.sources.base import slowest_us
+from thenar.runtime.sources.base import sources_of
 from thenar.runtime.sources.rows import RowSource, steps_of
 
 GLOVE = """
@@ -76,7 +76,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         faults: list[str] | None = None,
     ) -> tuple[RowSource, Frames]:
         harness = parse_harness(text, "glove.toml")
-        source = RowSource(Script([chunk for _, chunk in chunks]), harness, 0, names, whole_scan(harness, names))
+        source = RowSource(Script([chunk for _, chunk in chunks]), harness, 0, whole_scan(harness, names))
         if only is not None:
             source.read_only(only)
         source.open()
@@ -163,7 +163,7 @@ def test_no_frame_is_of_the_future_and_none_goes_back(steps: list[tuple[int, int
     for wait_ms, sent in steps:
         came_us += 1000 * wait_ms
         time_us = clock.host_us(float(sent), came_us)
-        if time_us is not None and time_us not in (module._LATE, module._JUMPED):
+        if isinstance(time_us, int):
             assert shown[-1] <= time_us <= came_us
             shown.append(time_us)
 
@@ -422,5 +422,6 @@ def test_a_harness_survives_its_file() -> None:
 
 def test_a_stream_counts_as_what_it_has() -> None:
     harness = parse_harness(GLOVE, "glove.toml")
-    assert [slowest_us(harness, whole_scan(harness, NAMES), kind) for kind in ("switches", "joints")] == [20_000] * 2
-    assert slowest_us(harness, whole_scan(harness, ()), "switches") is None
+    (source,), (nothing,) = (sources_of(harness, names, whole_scan(harness, names)) for names in (NAMES, ()))
+    assert (source.period_us, source.owned != 0, source.reads_joints) == (20_000, True, True)
+    assert (nothing.owned, nothing.reads_joints) == (0, True)

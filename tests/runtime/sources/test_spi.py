@@ -1,19 +1,19 @@
 """What an SPI source makes of the codes of its converter; that they are read is shown on real device nodes."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from thenar.drivers.spi.device import SpiDevice
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness, SpiWiring
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources import i2c
-from thenar.runtime.sources.base import SOURCES, slowest_us
+from thenar.runtime.sources.base import slowest_us, sources_of
 from thenar.runtime.sources.spi import SpiConverter
-from thenar.runtime.taxels import TaxelCalibration, TaxelLine, TaxelSettings
+from thenar.runtime.taxels import TaxelCalibration
+
+from ...gloves import pad_line
 
 HARNESS = Harness(
     name="x",
@@ -71,11 +71,9 @@ def test_where_no_converter_answers_levels_are_lost_and_it_says_so(answers: list
     assert "mcp3008 does not reply" in device.fault_message()
 
 
-def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]], tmp_path: Path) -> None:
-    lines = tuple(TaxelLine(name, rest=50, press=600) for name in ("t1", "t2"))
-    (tmp_path / "taxels.toml").write_text(TaxelCalibration(taxels=lines).to_toml())
-    settings = TaxelSettings(calibration=str(tmp_path / "taxels.toml"))
-    device = SpiConverter(replace(HARNESS, taxel_settings=settings), 1, whole_scan(HARNESS, NAMES))
+def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]]) -> None:
+    lines = tuple(pad_line(name, rest=50, press=600) for name in ("t1", "t2"))
+    device = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES), TaxelCalibration(sensors=lines))
     answers.append([1023, 400])
     found = device.read(0.1)
     assert found is not None
@@ -85,11 +83,11 @@ def test_a_saturated_taxel_is_lost_and_named(answers: list[list[int | None]], tm
 
 def test_only_devices_with_levels_are_sources_of_a_build() -> None:
     scan = whole_scan(HARNESS, ["t1>40", "s0"])
-    sources = [source.name for kind in SOURCES.values() for source in kind.sources(HARNESS, ["t1>40", "s0"], scan)]
+    sources = [source.name for source in sources_of(HARNESS, ["t1>40", "s0"], scan)]
     assert sources == ["i2c at /dev/i2c-1", "spi at /dev/spidev0.1"]
-    assert slowest_us(HARNESS, scan, "switches") == 10_000
+    assert slowest_us(sources_of(HARNESS, ["t1>40", "s0"], scan)) == 10_000
     everything = whole_scan(HARNESS, [], every_taxel=True)
-    assert [s.name for kind in SOURCES.values() for s in kind.sources(HARNESS, [], everything)] == [
+    assert [source.name for source in sources_of(HARNESS, [], everything)] == [
         "spi at /dev/spidev0.0",
         "spi at /dev/spidev0.1",
     ]
