@@ -188,6 +188,8 @@ def test_the_map_is_pointed_at_clicked_and_encircled(browser: Browser, studio: S
     line = [(0, low), (right, low), (right, high), (0, high)]
     loop(browser, line)
     browser.wait(lambda: browser.text("selection-heading") == f"{inside} trials selected")
+    # A line that begins on selected text would drag this.
+    assert browser.script("return String(getSelection())") == ""
     browser.driver.find_element(By.TAG_NAME, "body").send_keys("n")
     cards(browser, 1)
     on_map(browser, reply)
@@ -203,21 +205,38 @@ def test_the_map_is_pointed_at_clicked_and_encircled(browser: Browser, studio: S
     for key in (Keys.ARROW_LEFT, Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_DOWN):
         canvas.send_keys(key)
         browser.wait(lambda: browser.text("pointed").strip())
-    named = browser.text("pointed")
+    named, large = browser.text("pointed"), radius(browser, ".pointed")
+    assert large > radius(browser, ".selected:not(.pointed)")
     canvas.send_keys(Keys.ENTER)
     browser.wait(lambda: browser.text("selection-heading") == named)
+    assert radius(browser, ".pointed.selected") == large
 
 
-def finger(browser: Browser, line: list[tuple[int, int]]) -> None:
-    """Draw a line on the map with a finger."""
+def radius(browser: Browser, mark: str) -> float:
+    """Return the radius of the first mark on the map that a selector finds, in pixels."""
+    script = "return parseFloat(getComputedStyle(document.querySelector(`#map ${arguments[0]}`)).r)"
+    return float(browser.script(script, mark))
+
+
+def test_two_fingers_enlarge_the_map(browser: Browser, studio: Start) -> None:
+    opened = studio()
+    open_errors(browser, opened, width=400)
+    on_map(browser, errors_of(opened))
+    finger(browser, [(-10, 0), (-120, -80)], [(10, 0), (120, 80)])
+    browser.wait(lambda: browser.script("return visualViewport.scale") > 1.5)
+    assert browser.text("selection-heading") == "No trial selected"
+
+
+def finger(browser: Browser, *lines: list[tuple[int, int]]) -> None:
+    """Draw a line on the map with a finger, or several lines of as many corners with several."""
     script = """const { x, y, width, height } = document.getElementById("map").getBoundingClientRect();
         return [x + width / 2, y + height / 2]"""
     x, y = browser.script(script)
-    corners = np.array(line)
-    for share in np.arange(0, len(line) - 1, 0.1):
+    corners = np.array(lines)
+    for share in np.arange(0, len(lines[0]) - 1, 0.1):
         corner, rest = int(share), share % 1
-        place = corners[corner] + rest * (corners[corner + 1] - corners[corner])
-        points = [{"x": x + float(place[0]), "y": y + float(place[1])}]
+        places = corners[:, corner] + rest * (corners[:, corner + 1] - corners[:, corner])
+        points = [{"x": x + float(place[0]), "y": y + float(place[1]), "id": at} for at, place in enumerate(places)]
         touch = {"type": "touchMove" if share else "touchStart", "touchPoints": points}
         browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", touch)
     browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
