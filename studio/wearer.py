@@ -40,19 +40,23 @@ class WearerPage:
         about: dict[str, object] = {"wearer": state.wearer}
         try:
             base, build = self.base()
-            members = self._project.members("set")
-            for number, member in enumerate(members):
-                report(number, len(members))
-                path = self._project.folder / member.name
-                if (grasp_set := self._fitting(path, build)) is not None:
-                    sets[path] = f"{path.name}: {grasp_set.size}"
-            self._sets = [*sets]
-            if sets:
-                about |= self._trials_shown(base, build)
         except ThenarError as reason:
             self._sets = []
             self._studio.publish("wearing", about, why=str(reason), sets=())
             return
+        members = self._project.members("set")
+        for number, member in enumerate(members):
+            report(number, len(members))
+            path = self._project.folder / member.name
+            if (grasp_set := self._fitting(path, build)) is not None:
+                sets[path] = f"{path.name}: {grasp_set.size}"
+        self._sets = [*sets]
+        if sets:
+            # A damaged log of edits hinders neither recording nor undo.
+            try:
+                about |= self._trials_shown(base, build)
+            except ThenarError as reason:
+                about["notes"] = [str(reason)]
         types = [grasp for grasp in build.grasps if grasp != NONE]
         record = ["record", "--glove", self._project.harness, "--for", base, "--subject", state.wearer]
         record += ["-o", self._project.new_path(state.wearer, ".grasps", ".mcap")]
@@ -96,21 +100,18 @@ class WearerPage:
         self._project.remember(wearer=asked.name)
         self._studio.changed()
 
-    def _trials(self, paths: Sequence[Path], build: Build) -> tuple[GraspSet, list[str]]:
-        """Return the trials in sets, and their types that the build does not know."""
-        whole = self._project.recordings(paths)[0]
-        return whole, sorted({*whole.grasps.tolist()} - {*build.grasps, NONE})
-
     def _trials_shown(self, base: Path, build: Build) -> dict[str, object]:
-        """Return the numbers of the wearer's trials, by type, and the command that adapts to them."""
-        trials, added = self._trials(self._sets, build)
+        """Return the numbers of the wearer's trials, by type, what is not used, and the command that adapts to them."""
+        trials, rows, notes = self._project.recordings(self._sets)
+        added, used = _added(trials, build), {trial[0] for trial in rows}
+        sets = [path for path in self._sets if path.name in used]
         counts = Counter(trials.grasps[np.unique(trials.trial_ids, return_index=True)[1]].tolist())
         known = int(np.count_nonzero(trained_on(build.manifest, trials)))
-        notes = [f"new types are added: {list_names(added)}"] if added else []
+        notes += [f"new types are added: {list_names(added)}"] if added else []
         notes += [f"{known} of these trials are of the build's training: before is too good"] if known else []
         more = [word for name in added for word in ("--add-type", name)]
         more += ["-o", str(self._project.new_path(self._project.state.wearer))]
-        return {"counts": counts, "notes": notes, "adapt": self._project.command(["adapt", base], self._sets, more)}
+        return {"counts": counts, "notes": notes, "adapt": self._project.command(["adapt", base], sets, more)}
 
     # The build.
 
@@ -126,9 +127,8 @@ class WearerPage:
             # The wearer may have been another when this was asked for.
             if self._fitting(path, build) is None:
                 raise SettingError(f"{path.name} is no recording of {self._project.state.wearer} for this build")
-        trials, added = self._trials(paths, build)
-        output = self._project.new_path(self._project.state.wearer)
-        made = adapt(base, trials, output=output, add_type=added)
+        trials, output = self._project.recordings(paths)[0], self._project.new_path(self._project.state.wearer)
+        made = adapt(base, trials, output=output, add_type=_added(trials, build))
         self._project.remember(build=output.name, former=self._project.state.build)
         self._studio.changed()
         return _result(made)
@@ -138,6 +138,11 @@ class WearerPage:
             raise SettingError("there is nothing to undo: the build in use was not adapted here")
         self._project.remember(build=self._former, former="")
         self._studio.changed()
+
+
+def _added(trials: GraspSet, build: Build) -> list[str]:
+    """Return the types of trials that a build does not know."""
+    return sorted({*trials.grasps.tolist()} - {*build.grasps, NONE})
 
 
 def _result(made: AdaptedBuild) -> dict[str, object]:

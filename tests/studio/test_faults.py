@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -80,6 +81,28 @@ def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(
         # The two may come in either order.
         told = [until(live, lambda told: told["topic"] == "adapt" or told.get("build") == "C") for _ in range(2)]
         assert {one["topic"]: one.get("folder") or one["base"] for one in told} == {"adapt": "C", "wearing": "more"}
+
+
+def test_recordings_that_cannot_be_used_leave_a_wearer_recording_and_undo(
+    studio: Start, two_builds: Path, people: GraspSet, hand: HandShape, tmp_path: Path
+) -> None:
+    folder = tmp_path / "recorded"
+    shutil.copytree(two_builds, folder)
+    Project(folder, hand).remember(build="more", wearer="C")
+    mine = people.rows(people.subjects == "C")
+    mine.save(folder / "C.grasps")
+    replace(mine, joints=mine.joints[:1], codes=mine.codes[:, :1]).save(folder / "C-2.grasps")
+    (folder / "edits.jsonl").write_text("{}\n{}\n")
+    opened = studio(None)
+    with page(opened.server.url, "wearing") as live:
+        shown = until(live, lambda told: bool(told["sets"]))
+        assert (shown["why"], shown["base"], len(shown["sets"])) == ("", "more", 2)
+        assert [note.partition(":")[0] for note in shown["notes"]] == [str(folder / "edits.jsonl")]
+        (folder / "edits.jsonl").unlink()
+        opened.changed()
+        shown = until(live, lambda told: "adapt" in told)
+    assert [note.partition(":")[0] for note in shown["notes"]] == ["C.grasps is left aside"]
+    assert "/C.grasps" not in shown["adapt"]
 
 
 def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:
