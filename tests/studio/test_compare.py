@@ -142,6 +142,8 @@ def test_the_hand_shows_which_build_reads_a_sensor(browser: Browser, project: St
     assert sorted(map(tuple, signs)) == sorted(
         [("both", names[1]), ("both", names[2]), ("a", names[0]), ("b", names[3])]
     )
+    # No line of a sensor crosses its letters.
+    assert not [one for one in browser.driver.find_elements(By.CSS_SELECTOR, "#hand .open") if one.is_displayed()]
     assert browser.texts("#legend li") == [
         f"both: 2, {names[1]}, {names[2]}",
         f"only a (few): 1, {names[0]}",

@@ -160,6 +160,19 @@ def test_a_cyberglove_is_found_when_its_port_is_named_so(browser: Browser, studi
     assert (harness.cyberglove.port, len(harness.sensor_names)) == (f"{folder}/port", 22)
 
 
+def test_what_is_said_of_a_lost_device_can_be_copied(browser: Browser, studio: Start, folder: Path) -> None:
+    """It is not written anew five times a second, which would take the selection of its text away."""
+    harness_in(folder, "/dev/none")
+    opened = studio(None)
+    open_glove(browser, opened)
+    browser.wait(lambda: "lost: /dev/none" in browser.text("devices-table"))
+    browser.script("getSelection().selectAllChildren(document.getElementById('devices'))")
+    with page(opened.server.url, "glove-state") as live:
+        for _ in range(4):
+            live.recv(timeout=PATIENCE_S)
+    assert "lost: /dev/none" in browser.script("return String(getSelection())")
+
+
 def test_an_address_without_a_glove_is_said(browser: Browser, studio: Start, folder: Path) -> None:
     open_glove(browser, studio(None))
     browser.wait(lambda: browser.text("addresses"))
