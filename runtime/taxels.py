@@ -41,7 +41,7 @@ _END_SHIFT = 9
 class TaxelLine(SensorCalibration, frozen=True):
     """The straight line of one taxel, from its counts at rest, `raw_a`, to those of a press.
 
-    Raises SettingError if a press has the value of rest.
+    Raises SettingError if the values of rest and press are not in this order, from 0 on.
     """
 
     raw_a: Raw
@@ -49,8 +49,8 @@ class TaxelLine(SensorCalibration, frozen=True):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.value_a == self.value_b:
-            raise SettingError(f"{self.name!r}: rest and press have one value: calibrate it again")
+        if not 0 <= self.value_a < self.value_b <= 1e9:
+            raise SettingError(f"{self.name!r}: the value of a press must be above that of rest, both from 0 to 1e9")
 
 
 class TaxelCalibration(SensorLines, frozen=True, kw_only=True):

@@ -5,7 +5,8 @@ import math
 import re
 import tomllib
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,13 +78,25 @@ class TomlText(Struct, frozen=True):
         return self.raises(f"{self.name}, line {self.line(place)}: {where}{shown}")
 
     def line(self, place: Place) -> int:
-        """Return the line of `place`, counted from 1, or of the innermost table around it that exists: the first lines
-        that have it end with its own.
-        """
-        while not _has(tomllib.loads(self.text), place):
-            place = place[:-1]
-        lines = self.text.split("\n")
-        return 1 + bisect_left(range(1, len(lines)), True, key=lambda number: _has(_begun(lines[:number]), place))
+        """Return the line of `place`, counted from 1, or of the innermost table around it that exists."""
+        table: Place = ()
+        line, deepest, counts = 1, 0, Counter[Place]()
+        for first, lines in _statements(self.text):
+            content: Any = _begun(lines)
+            heads = lines[0].lstrip().startswith("[")
+            if heads:
+                table, content = _headed(content, counts), {}
+            for key in reversed(table):
+                content = {key: content}
+            depth = _depth(content, place)
+            if depth > deepest or (heads and depth == deepest == len(table)):
+                # Of a value of several lines, the first lines that go as deep end with the line.
+                rest = place[len(table) :]
+                more = bisect_left(
+                    range(1, len(lines)), depth - len(table), key=lambda end: _depth(_begun(lines[:end]), rest)
+                )
+                line, deepest = first + more, depth
+        return line
 
 
 def read_source(file: "Traversable", raises: type[ThenarError]) -> TomlText:
@@ -120,14 +133,38 @@ def spelled(place: Place) -> str:
     return "".join(f"[{key}]" if isinstance(key, int) else f".{shortened(key)}" for key in place).removeprefix(".")
 
 
-def _has(value: Any, place: Place) -> bool:
-    """Return whether a table has a place."""
-    try:
-        for key in place:
+def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield headers, keys with their values, and lines without any: each one's first line, and its lines."""
+    start = line = open_lists = 0
+    for found in _TOKEN.finditer(f"{text}\n"):
+        open_lists += (found[0] in ("[", "{")) - (found[0] in ("]", "}"))
+        if found[0] == "\n" and not open_lists:
+            lines = text[start : found.start()].split("\n")
+            yield line + 1, lines
+            start, line = found.end(), line + len(lines)
+
+
+def _headed(content: Any, counts: Counter[Place]) -> Place:
+    """Return the place of the table that a header, read by itself, begins; `counts` are of the lists' tables so far."""
+    place: Place = ()
+    while content:
+        ((key, content),) = content.items()
+        place = (*place, key)
+        if isinstance(content, list):
+            counts[place], content = counts[place] + 1, {}
+        if place in counts:
+            place = (*place, counts[place] - 1)
+    return place
+
+
+def _depth(value: Any, place: Place) -> int:
+    """Return how many keys of a place, from its first, a table has."""
+    for depth, key in enumerate(place):
+        try:
             value = value[key]
-    except (KeyError, IndexError, TypeError):
-        return False
-    return True
+        except (KeyError, IndexError, TypeError):
+            return depth
+    return len(place)
 
 
 def _begun(lines: Sequence[str]) -> dict[str, object]:

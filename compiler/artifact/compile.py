@@ -242,7 +242,7 @@ class BuildAssembly:
         if self.harness is not None:
             self.scan = plan_scan(names, self.harness)
             joints = [grasp_set.joint_names[joint] for joint in recogniser.selection.joints]
-            self.unread = unread_joints(self.harness, self.scan, joints)
+            self.unread = unread_joints(self.harness, names, self.scan, joints)
         self.comparison = compare(recogniser.model, self.integers, self.kept.switches, self.kept.codes)
         self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in recogniser.selection.joints))
         sources = [grasp_set.element_names[element.column] for element in recogniser.elements]

@@ -18,12 +18,12 @@ from .recogniser import LiveRecognizer
 from .sources import Sources
 
 
-def unread_joints(harness: Harness, scan: ScanMap, joints: Sequence[str]) -> str:
+def unread_joints(harness: Harness, switch_names: Sequence[str], scan: ScanMap, joints: Sequence[str]) -> str:
     """Return a sentence on a build's `joints` if nothing in `harness` reads them; "" if all are read.
 
     Raises SettingError if the harness reads joints, but lacks one of the build.
     """
-    if not joints or any(source.reads_joints for source in sources_of(harness, (), scan)):
+    if not joints or any(source.reads_joints for source in sources_of(harness, switch_names, scan)):
         for joint in joints if harness.joint_device is not None else ():
             place_of(joint, harness.sensor_names)
         return ""
@@ -77,7 +77,8 @@ class LiveSystem(Struct, frozen=True, eq=False):
     @property
     def unread(self) -> str:
         """A sentence on the build's joints if nothing in the harness reads them; "" if everything is read."""
-        return unread_joints(self.harness, self.scan, [joint.name for joint in self.build.manifest.joints])
+        joints = [joint.name for joint in self.build.manifest.joints]
+        return unread_joints(self.harness, self.switch_names, self.scan, joints)
 
     def recognizer(self) -> LiveRecognizer:
         """Return a recogniser for the frames of the devices.

@@ -121,7 +121,10 @@ def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:
     ("sensor", "said"),
     [
         ({"raw_b": "5"}, "raw_a and raw_b are both 5, which makes no line"),
-        ({"value_b": "0.0"}, "rest and press have one value"),
+        ({"value_b": "0.0"}, "a press must be above that of rest"),
+        ({"value_b": "-2.0"}, "a press must be above that of rest"),
+        ({"value_a": "3.0"}, "a press must be above that of rest"),
+        ({"value_a": "-1e300", "value_b": "1e300"}, "a press must be above that of rest"),
         ({"value_b": "nan"}, r"sensor\[0\]\.value_b: must be a finite number"),
         ({"value_b": "1.0}, {name = 'a', raw_a = 1, value_a = 0.0, raw_b = 2, value_b = 1.0"}, "calibrated twice"),
         ({"raw_b": "70000"}, "raw_b"),

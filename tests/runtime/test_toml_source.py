@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from time import process_time
 
 import pytest
 from hypothesis import given
@@ -184,3 +185,22 @@ def test_what_an_error_repeats_of_a_file_is_short_and_printable() -> None:
 def test_a_folder_is_refused_as_what_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(OwnError, match="cannot be read: Is a directory"):
         read_source(tmp_path, OwnError)
+
+
+def test_a_table_is_found_by_its_own_header_though_another_one_made_it() -> None:
+    text = "[a.b]\nx = 1\n[a]\ny = 2\n"
+    assert [TomlText("a.toml", text, ThenarError).line(place) for place in (("a",), ("a", "z"), ("a", "b"))] == [
+        3,
+        3,
+        1,
+    ]
+
+
+def test_a_line_at_the_end_of_a_long_file_costs_little_more_than_reading_it() -> None:
+    text = "".join(f'[[bus.chip]]\nkind = "mcp23017"\n[bus.chip.pins]\nGPA0 = "s{number}"\n' for number in range(3000))
+    source = TomlText("glove.toml", f"[[bus]]\n{text}", ThenarError)
+    began = process_time()
+    source.tables()
+    read_s, began = process_time() - began, process_time()
+    assert source.line(("bus", 0, "chip", 2999, "pins", "GPA1")) == 12_000
+    assert process_time() - began < 8 * read_s

@@ -13,13 +13,15 @@ from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.wiring import Harness, StreamWiring
 from thenar.runtime.live import sources as module
 from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.live.sources import DeviceThread, FrameBuffer, Sources
+from thenar.runtime.live.system import LiveSystem
 from thenar.runtime.policy import Policy
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.sources.base import Source
+from thenar.runtime.sources.base import SOURCES, Source, SourceKind
 from thenar.runtime.taxels import TaxelCalibration
 
 from ...gloves import pad_line
@@ -338,6 +340,25 @@ def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.Lo
         assert kept.next_change() == (False, "ZeroDivisionError: oops")
     assert kept.keeper.faults == 3
     assert len([record for record in caplog.records if record.exc_info]) == 1
+
+
+def test_a_source_of_ones_own_is_told_the_switches_whenever_it_is_made(
+    make_build: MakeBuild, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build, told = make_build(joints=2), list[tuple[str, ...]]()
+
+    def sources(_harness: Harness, names: Sequence[str], *_: object) -> Iterator[Source]:
+        told.append(tuple(names))
+        yield from ()
+
+    monkeypatch.setattr(SOURCES, "_members", {"own": SourceKind("own", sources)})
+    names = tuple(switch.name for switch in build.manifest.switches)
+    stream = StreamWiring(port="-", columns=names, switches=names)
+    system = LiveSystem.of(build, Harness(name="own", streams=(stream,)))
+    assert "nothing in 'own' reads the build's joints" in system.unread
+    system.recognizer()
+    with Sources(system.harness, system.switch_names, system.scan):
+        assert told == [names] * 3
 
 
 def test_devices_know_the_calibration_of_taxels_that_glove_toml_names(tmp_path: Path) -> None:
