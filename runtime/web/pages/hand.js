@@ -4,7 +4,6 @@ const SVG = "http://www.w3.org/2000/svg";
 const NARROW = 560; // up to this width, in pixels, the parts are drawn one below the other
 const LEAST_UNIT = 0.3; // minimum millimetres per pixel, so that few inputs are not drawn huge
 const LETTER = 9.5; // minimum size of a letter, pixels
-const FINGER = 6; // minimum half size of a button, pixels, if there is room
 
 /** Return a new element of a drawing with these attributes, and texts and elements in it. */
 export function draw(kind, attributes = {}, ...children) {
@@ -67,7 +66,6 @@ class Glove {
     this.taxels = hand.taxels.map(({ name }) => this.spots.find((spot) => spot.disc && spot.name === name));
     const points = [...hand.outline, ...hand.strips.flat(), ...[...all, ...hand.labels].map((one) => [one.x_mm, one.y_mm])];
     this.box = points.length ? around(points, hand.placed ? [12, 5] : [22, 16]) : null;
-    this.spacing = spacing(kept);
   }
 
   #place({ name, x_mm, y_mm }, ...parts) {
@@ -81,7 +79,7 @@ class Glove {
   // A switch: a ring, and closed a full square, larger, on a corner. A taxel: a square, and in it a disc that shows how
   // far it is pressed; with all levels closed the square is full. Lost: a cross in a dashed line.
   #spot(one, bits, onSwitch) {
-    const r = this.#hand.radius_mm, side = 1.35 * r, area = draw("circle", { class: "area", r: 2 * r });
+    const r = this.#hand.radius_mm, side = 1.35 * r;
     const disc = one.levels ? draw("circle", { class: "press", r: 0 }) : null, parts = disc
       ? [
         draw("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }),
@@ -93,7 +91,7 @@ class Glove {
         draw("path", { class: "shut", d: `M0 ${-2 * r}L${2 * r} 0L0 ${2 * r}L${-2 * r} 0Z` }),
       ];
     const cross = draw("path", { class: "cross", d: `M${-r} ${-r}L${r} ${r}M${r} ${-r}L${-r} ${r}` });
-    const group = this.#place(one, ...parts, cross), spot = { name: one.name, bits, group, disc, area, count: 0, value: null };
+    const group = this.#place(one, ...parts, cross), spot = { name: one.name, bits, group, disc, count: 0, value: null };
     if (!onSwitch) return spot;
     // From level to level, and from the last to none.
     const press = () => {
@@ -102,7 +100,7 @@ class Glove {
         if (!this.#closed[bit] === at < next) onSwitch(bit, at < next);
       });
     };
-    pressable(group, one.name, press).append(area);
+    pressable(group, one.name, press).append(draw("circle", { class: "area", r: 2 * r }));
     return spot;
   }
 
@@ -134,27 +132,6 @@ class Glove {
       this.#press(taxel, value ?? taxel.count / taxel.bits.length);
     });
   }
-
-  // One pixel of the screen is `unit` of the drawing.
-  fit(unit) {
-    const reach = Math.max(2 * this.#hand.radius_mm, Math.min(2 * FINGER * unit, this.spacing / 2));
-    for (const { area } of this.spots) area.setAttribute("r", reach.toFixed(2));
-  }
-
-  get said() {
-    const switches = this.spots.filter(({ disc }) => !disc), closed = switches.filter(({ count }) => count).length;
-    return switches.length ? `: ${closed} of ${switches.length} switches closed` : "";
-  }
-}
-
-function spacing(places) {
-  let least = Infinity;
-  places.forEach((one, at) => {
-    for (const other of places.slice(at + 1)) {
-      least = Math.min(least, Math.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm));
-    }
-  });
-  return least;
 }
 
 /* ---- The posed hand: a right hand, seen from the side of its thumb; x to the thumb, y to the tips, z off the palm ---- */
@@ -266,38 +243,24 @@ function posedHand(joints) {
   return { group, set, box: { left: -72, top: -202, width: 152, height: 246 } };
 }
 
-/* ---- Joints of which nobody knows where they are: needles, from level to upright ---- */
+/* ---- Joints of which nobody knows where they are: squares as of taxels, in a grid ---- */
 
-function dials(joints) {
-  const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length)))), size = 46;
-  const needles = joints.map(({ name }, at) => {
-    const needle = draw("path", { class: "needle", d: "M0 0H26" });
-    const handle = draw("path", { class: "handle", d: "M-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0 -5.2 0" });
-    const group = draw(
-      "g",
-      { transform: `translate(${size * (at % columns) + 9} ${size * Math.floor(at / columns) + 34})` },
-      draw("path", { class: "dial", d: "M0 0H26A26 26 0 0 0 0 -26Z" }),
-      needle,
-      handle,
-      draw("text", { x: 13, y: 9, class: "middle" }, shortened(name, 12)),
-      draw("title", {}, name),
-    );
-    return { group, needle, handle };
+function unplaced(joints) {
+  const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length))));
+  const taxels = joints.map(({ name }, at) => {
+    return { name, x_mm: 36 * (at % columns), y_mm: -26 * Math.floor(at / columns), levels: [[0, at]] };
   });
-  const set = (values) => {
-    joints.forEach((joint, at) => {
-      const value = values[joint.joint] ?? null, span = joint.high - joint.low;
-      const share = value === null || !(span > 0) ? 0 : Math.min(Math.max((value - joint.low) / span, 0), 1);
-      const angle = (share * Math.PI) / 2, end = `${(26 * Math.cos(angle)).toFixed(1)} ${(-26 * Math.sin(angle)).toFixed(1)}`;
-      const { group, needle, handle } = needles[at];
-      needle.setAttribute("d", `M0 0L${end}`);
-      handle.setAttribute("transform", `translate(${end})`);
-      group.classList.toggle("gone", value === null);
-    });
+  const grid = new Glove({ placed: false, radius_mm: 6, outline: [], strips: [], creases: [], labels: [], switches: [], taxels });
+  grid.set = (values) => {
+    const own = joints.map(({ joint }) => values[joint] ?? null);
+    grid.setTaxels(own.map((value, at) => {
+      const { low, high } = joints[at];
+      return value === null ? 0 : (value - low) / (high - low || 1);
+    }));
+    grid.setClosed([], own.map((value) => value === null));
   };
-  set([]);
-  const box = { left: 0, top: 0, width: size * columns, height: size * Math.ceil(joints.length / columns) };
-  return { group: draw("g", {}, ...needles.map((one) => one.group)), set, box };
+  grid.set([]);
+  return grid;
 }
 
 /* ---- All of it ---- */
@@ -318,13 +281,12 @@ function dials(joints) {
 export function drawHand(svg, hand, { onSwitch = null } = {}) {
   const glove = new Glove(hand, onSwitch), placed = hand.joints.filter((joint) => joint.digit);
   const others = hand.joints.filter((joint) => !joint.digit);
-  const joints = [...(placed.length ? [posedHand(placed)] : []), ...(others.length ? [dials(others)] : [])];
+  const joints = [...(placed.length ? [posedHand(placed)] : []), ...(others.length ? [unplaced(others)] : [])];
   const parts = [...(glove.box ? [glove] : []), ...joints];
   svg.replaceChildren(glove.group, ...joints.map(({ group }) => group));
   svg.classList.add("hand");
   svg.setAttribute("role", onSwitch ? "group" : "img");
-  const say = () => svg.setAttribute("aria-label", `The hand${onSwitch ? "" : glove.said}`);
-  say();
+  svg.setAttribute("aria-label", "The hand");
 
   let wide = -1;
   const arrange = () => {
@@ -343,18 +305,13 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
     }
     const [broad, tall] = narrow ? [across, y] : [x, high], whole = Math.max(broad, LEAST_UNIT * width);
     svg.setAttribute("viewBox", `${((broad - whole) / 2).toFixed(1)} 0 ${whole.toFixed(1)} ${tall.toFixed(1)}`);
-    const unit = whole / width;
-    svg.style.setProperty("--letter", `${(LETTER * unit).toFixed(2)}px`);
-    if (glove.box) glove.fit(unit);
+    svg.style.setProperty("--letter", `${((LETTER * whole) / width).toFixed(2)}px`);
   };
   arrange();
   new ResizeObserver(arrange).observe(svg);
 
   return {
-    setClosed(bits, lost) {
-      glove.setClosed(bits, lost);
-      if (!onSwitch) say();
-    },
+    setClosed: (bits, lost) => glove.setClosed(bits, lost),
     setTaxels: (values) => glove.setTaxels(values),
     setPose(values) {
       for (const part of joints) part.set(values);
