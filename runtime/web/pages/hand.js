@@ -248,9 +248,9 @@ function posedHand(joints) {
 function unplaced(joints) {
   const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length))));
   const taxels = joints.map(({ name }, at) => {
-    return { name, x_mm: 36 * (at % columns), y_mm: -26 * Math.floor(at / columns), levels: [[0, at]] };
+    return { name, x_mm: 50 * (at % columns), y_mm: -22 * Math.floor(at / columns), levels: [[0, at]] };
   });
-  const grid = new Glove({ placed: false, radius_mm: 6, outline: [], strips: [], creases: [], labels: [], switches: [], taxels });
+  const grid = new Glove({ placed: false, radius_mm: 3, outline: [], strips: [], creases: [], labels: [], switches: [], taxels });
   grid.set = (values) => {
     const own = joints.map(({ joint }) => values[joint] ?? null);
     grid.setTaxels(own.map((value, at) => {
