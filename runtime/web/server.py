@@ -291,7 +291,7 @@ class Server(Closing):
 
 
 class _Page:
-    """A page that is open in a browser: its WebSocket, the topics that it shows, or all, and what it was sent of them."""
+    """A page that is open in a browser: its WebSocket, the topics that it shows, or all, and what it was sent last."""
 
     def __init__(
         self, live: web.WebSocketResponse, transport: asyncio.Transport, now_s: float, topics: frozenset[str] | None
