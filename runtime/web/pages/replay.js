@@ -4,7 +4,7 @@ import { $, say } from "./wire.js";
 
 const ASK_MS = 80, LATER_MS = 500; // the server takes 20 requests a second
 const FRAME_MS = 40; // while it plays
-const AHEAD_US = 1_000_000, STEP_US = 33_000; // of moments asked for at once, at normal speed
+const AHEAD = 2, KEPT = 8; // seconds
 
 export class Replay {
   #view;
@@ -12,7 +12,7 @@ export class Replay {
   #ask;
   #labels = new Map(); // spans by the number of their trial
   #counts = [];
-  #moments = { from: 0, to: -1, frames: [] };
+  #seconds = new Map(); // moments, by their second since 1970
   #asking = false; // for moments
   #asked = 0;
   #playing = false;
@@ -30,6 +30,7 @@ export class Replay {
   /** Begin, or begin again after the server came back: the position stays. */
   begin() {
     this.#labels.clear();
+    this.#seconds.clear();
     this.#counts = [...this.#timeline.tracks, this.#labels].map(() => 0);
     this.#asking = false;
     this.#ask("overview", this.#counts);
@@ -62,12 +63,13 @@ export class Replay {
     if (share < 1 || more) setTimeout(() => this.#ask("overview", this.#counts), more ? ASK_MS : LATER_MS);
   }
 
-  /** Take moments. */
-  moments({ from_us, to_us, frames }) {
+  /** Take the moments of a second; none were read yet if there are none. */
+  moments({ second, frames }) {
     this.#asking = false;
-    this.#moments = { from: from_us, to: to_us, frames };
-    this.#show();
-    if (frames.length) this.#fetch(); // or it was not read yet
+    if (!frames.length) return;
+    this.#seconds.set(second, frames);
+    if (this.#seconds.size > KEPT) this.#seconds.delete(this.#seconds.keys().next().value);
+    this.moved();
   }
 
   /** Play, or pause. */
@@ -95,26 +97,18 @@ export class Replay {
   #play() {
     if (!this.#playing) return;
     setTimeout(() => this.#play(), FRAME_MS);
-    const { at, last } = this.#timeline, now = performance.now(), us = Math.min(at + (now - this.#before) * 1000 * this.#speed, last);
+    const { at, last } = this.#timeline, now = performance.now(), us = Math.min(at + (now - this.#before) * 1000 * Number($("speed").value), last);
     this.#before = now;
     // It waits for moments that have not come yet.
-    if (this.#covers(us)) this.#timeline.seek(us);
+    if (this.#seconds.has(secondOf(us))) this.#timeline.seek(us);
     if (at >= last && this.#share === 1) this.toggle();
-  }
-
-  get #speed() {
-    return Number($("speed").value);
-  }
-
-  #covers(us) {
-    return us >= this.#moments.from && us <= this.#moments.to;
   }
 
   // Show the moment at the cursor, if it has come, and compare it with the label.
   #show() {
-    const { at, truth, tracks } = this.#timeline;
-    if (at === null || !this.#covers(at) || !this.#moments.frames.length) return;
-    const frame = this.#moments.frames.findLast(({ change: [us] }) => us <= at) ?? this.#moments.frames[0];
+    const { at, truth, tracks } = this.#timeline, frames = this.#seconds.get(secondOf(at));
+    if (!frames) return;
+    const frame = frames.findLast(({ change: [us] }) => us <= at) ?? frames[0];
     const label = spanAt(truth, at)?.name ?? null, [, other] = tracks;
     this.#view.take(frame);
     const bad = label !== null && differs(frame.grasp, label);
@@ -126,22 +120,16 @@ export class Replay {
     $("other").classList.toggle("wrong", wrong);
   }
 
-  // Ask for the moments from the cursor on; one request at a time.
+  // Ask for the moments of the next second that is missing at the cursor; one request at a time.
   #fetch() {
-    if (this.#asking || this.#missing() === null) return;
+    const { at } = this.#timeline, now = secondOf(at), ahead = this.#playing ? AHEAD : 0;
+    const missing = Array.from({ length: ahead + 1 }, (_, more) => now + more).find((second) => !this.#seconds.has(second));
+    if (at === null || this.#asking || missing === undefined) return;
     this.#asking = true;
     setTimeout(() => {
-      const from = this.#missing(), ahead = Math.round(AHEAD_US * this.#speed), step = Math.round(STEP_US * this.#speed);
       this.#asked = performance.now();
-      this.#asking = from !== null && this.#ask("moments", [from, from + ahead, step]);
+      this.#asking = this.#ask("moments", [missing]);
     }, Math.max(ASK_MS - (performance.now() - this.#asked), 0));
-  }
-
-  // The time from which moments are missing now, or will be soon.
-  #missing() {
-    const { at, last } = this.#timeline, { to } = this.#moments;
-    const soon = this.#playing && to < last && at + (AHEAD_US / 2) * this.#speed > to;
-    return at !== null && (soon || !this.#covers(at)) ? at : null;
   }
 
   // Say how many labelled trials each build recognises: a trial is right if its type was announced for longest.
@@ -172,6 +160,8 @@ export class Replay {
     this.#timeline.seek(first + 1e6 * seconds);
   }
 }
+
+const secondOf = (us) => Math.floor(us / 1e6);
 
 // The time in the address, in seconds from the recording's beginning: "#t=12.34".
 function linked() {

@@ -303,9 +303,10 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             if asked["numbers"] == [0, 0, 0]:
                 return message("overview", overview)
             return message("overview", overview | {"have": asked["numbers"], "changes": [[], []], "truth": []})
-        at = asked["numbers"][0]
-        grasp = [grasp for time_us, grasp in first if time_us <= at][-1]
-        return message("moments", from_us=at, to_us=at, frames=[told(replace(GRASP, grasp=grasp, time_us=at))])
+        (second,) = asked["numbers"]
+        shown = [told(replace(GRASP, grasp=grasp, time_us=time_us)) for time_us, grasp in first]
+        before = [one for one in shown if one["time_us"] < 10**6 * (second + 1)]
+        return message("moments", second=second, frames=before)
 
     with Server("live", "127.0.0.1:0", token=None, on_message=reply) as server:
         server.publish("replay", message("replay", about))
