@@ -44,9 +44,9 @@ export class View {
     this.drawing = drawHand($("hand"), build.hand);
     const styles = typeStyles(build.grasps);
     this.rows = new Map(build.grasps.map((grasp) => {
-      const full = make("span"), share = make("span", { class: "share" }), bar = make("div", { class: "bar" }, full);
+      const bar = make("progress", { "aria-hidden": "true", value: 0 }), share = make("span", { class: "share" });
       const row = make("li", {}, chip(styles.get(grasp)), make("span", { class: "name" }, grasp), bar, share);
-      return [grasp, { row, full, share }];
+      return [grasp, { row, bar, share }];
     }));
     $("types").replaceChildren(...[...this.rows.values()].map(({ row }) => row));
     $("preshape").hidden = !build.preshapes;
@@ -142,9 +142,9 @@ export class View {
       const said = `${names.length} of ${counted}`;
       say($("hand-says"), `${said}${names.length ? ": " : ""}${names.slice(0, SHOWN).join(", ")}${more}`);
     }
-    for (const [at, [grasp, { row, full, share }]] of [...this.rows].entries()) {
+    for (const [at, [grasp, { row, bar, share }]] of [...this.rows].entries()) {
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
-      full.style.transform = `scaleX(${value ?? 0})`;
+      bar.value = value ?? 0;
       if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
       else row.removeAttribute("aria-current");
       say(share, value === null ? "–" : `${(100 * value).toFixed(value > 0.9995 || value < 0.0005 ? 0 : 1)} %`);

@@ -150,12 +150,12 @@ def test_a_build_without_an_empty_hand_says_so_beside_the_grasp(page: Callable[.
 def test_bars_and_numbers_are_of_one_frame(page: Callable[..., Run], browser: Any) -> None:
     run = page()
     pairs = """return [...document.querySelectorAll('#types li')].map((row) => [
-        row.querySelector('.share').textContent, row.querySelector('.bar span').style.transform])"""
+        row.querySelector('.share').textContent, row.querySelector('progress').value])"""
     for step in range(200):
         share = step / 200
         run.say(probabilities=[share, 1 - share])
         for words, bar in browser.script(pairs):
-            assert words in ("", "–") or abs(float(words[:-2]) / 100 - float(bar[7:-1])) < 0.002
+            assert words in ("", "–") or abs(float(words[:-2]) / 100 - bar) < 0.002
 
 
 def test_the_gloves_state_stands_in_the_bar_until_it_is_old(page: Callable[..., Run], browser: Any) -> None:
