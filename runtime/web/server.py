@@ -51,7 +51,7 @@ MOST_BYTES, MOST_PER_S, MOST_AT_ONCE = 16_384, 20.0, 40.0
 # Files that can be downloaded at the same time: a new one takes the place of the oldest.
 _MOST_OFFERED = 8
 # Replies that a page has not read, before it loses its place.
-MOST_UNREAD = 4 << 20
+MOST_UNREAD = 8 << 20
 _CLOSING_S = 0.5
 _ANY = {"0.0.0.0", "::"}
 

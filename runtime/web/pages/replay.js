@@ -10,8 +10,6 @@ export class Replay {
   #view;
   #timeline;
   #ask;
-  #labels = new Map(); // spans by the number of their trial
-  #counts = [];
   #seconds = new Map(); // moments, by their second since 1970
   #asking = false; // for moments
   #asked = 0;
@@ -20,7 +18,7 @@ export class Replay {
   #share = 0;
   #wanted = linked(); // the time of the address, until it was read
 
-  /** @param {function(string, number[]): boolean} ask asks for the "overview" or for "moments" */
+  /** @param {function(string, number[]=): boolean} ask asks for the "overview", or for the "moments" of a second */
   constructor(view, timeline, ask) {
     [this.#view, this.#timeline, this.#ask] = [view, timeline, ask];
     $("play").addEventListener("click", () => this.toggle());
@@ -29,38 +27,25 @@ export class Replay {
 
   /** Begin, or begin again after the server came back: the position stays. */
   begin() {
-    this.#labels.clear();
     this.#seconds.clear();
-    this.#counts = [...this.#timeline.tracks, this.#labels].map(() => 0);
     this.#asking = false;
-    this.#ask("overview", this.#counts);
+    this.#ask("overview");
     this.moved();
   }
 
-  /** Take what was read since. */
-  overview({ have, changes, truth, first_us, last_us, share, faults }) {
-    if (String(have) !== String(this.#counts)) return;
-    const { tracks } = this.#timeline, lists = [...changes, truth];
-    changes.forEach((some, number) => some.forEach((change) => tracks[number].take(change)));
-    for (const [trial, from, to, name] of truth) {
-      if (name) this.#labels.set(trial, { from, to, name });
-      else this.#labels.delete(trial);
-    }
-    this.#timeline.truth = [...this.#labels.values()].sort((one, other) => one.from - other.from);
-    this.#counts = have.map((count, number) => count + lists[number].length);
+  /** Take what was read so far. */
+  overview({ changes, truth, first_us, last_us, share, faults }) {
     this.#share = share;
     say($("scanned"), share < 1 ? `${Math.floor(100 * share)} % of the file is read` : "");
     say($("faults"), faults.join(" "));
     if (first_us !== null) {
-      for (const track of tracks) track.untilUs = last_us;
-      this.#timeline.recorded(first_us, Math.max(last_us, first_us + 1));
+      this.#timeline.recorded(changes, truth, first_us, Math.max(last_us, first_us + 1));
       this.#link(this.#wanted);
       if (this.#timeline.at === null) this.#timeline.seek(first_us);
       else this.moved();
       this.#rate();
     }
-    const more = lists.some((list) => list.length);
-    if (share < 1 || more) setTimeout(() => this.#ask("overview", this.#counts), more ? ASK_MS : LATER_MS);
+    if (share < 1) setTimeout(() => this.#ask("overview"), LATER_MS);
   }
 
   /** Take the moments of a second; none were read yet if there are none. */

@@ -158,13 +158,20 @@ export class Timeline {
     this.#say();
   }
 
-  /** Take the span of a recording and where its predictions differ from the labels. */
-  recorded(first, last) {
+  /** Take the changes of each build on a recording, the spans of its labels, and its own. */
+  recorded(changes, truth, first, last) {
     const fresh = this.last === null;
     [this.first, this.last] = [first, last];
     if (fresh || this.#whole) this.#show(first, last - first);
     this.#whole = fresh || this.#whole;
-    for (const track of this.tracks) track.errors = errors(this.truth, track.announced);
+    this.truth = truth.map(([from, to, name]) => ({ from, to, name }));
+    this.tracks = this.tracks.map(({ name }, number) => {
+      const track = new Track(name);
+      changes[number].forEach((change) => track.take(change));
+      track.untilUs = last;
+      track.errors = errors(this.truth, track.announced);
+      return track;
+    });
     for (const id of ["next-error", "last-error"]) $(id).disabled = this.tracks.every(({ errors: { wrong } }) => !wrong.length);
     this.draw();
   }
