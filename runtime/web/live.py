@@ -172,8 +172,8 @@ def shell_message(
 
 
 def build_message(topic: str, folder: Path, manifest: Manifest, *, silent_us: int | None, **shows: object) -> bytes:
-    """Return a message on the build in a folder: its name, types, switches and joints, whether it knows an empty hand,
-    the drawing of the hand, how long a moment of its run is current, or None for a recording, and what else the page
+    """Return a message on the build in a folder: its name, types and switches, whether it knows an empty hand, the
+    drawing of the hand, how long a moment of its run is current, or None for a recording, and what else the page
     `shows`. Raises BuildError if the drawing is damaged.
     """
     known = {
@@ -181,7 +181,6 @@ def build_message(topic: str, folder: Path, manifest: Manifest, *, silent_us: in
         "name": folder.resolve().name,
         "grasps": manifest.classes,
         "switches": [switch.name for switch in manifest.switches],
-        "joints": [joint.name for joint in manifest.joints],
         "empty_hand": manifest.knows_none,
         "hand": load_hand(folder, manifest),
     }

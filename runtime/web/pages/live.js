@@ -34,7 +34,6 @@ const ask = openPage({
   ...(ids.length ? {} : run),
   replay: (recording) => {
     for (const one of document.querySelectorAll("[data-of]")) one.hidden = one.dataset.of !== "recording";
-    $("other").hidden = recording.builds.length < 2;
     begin(recording);
     replay.begin();
   },

@@ -91,18 +91,14 @@ export class Replay {
 
   // Show the moment at the cursor, if it has come, and compare it with the label.
   #show() {
-    const { at, truth, tracks } = this.#timeline, frames = this.#seconds.get(secondOf(at));
+    const { at, truth } = this.#timeline, frames = this.#seconds.get(secondOf(at));
     if (!frames) return;
     const frame = frames.findLast(({ change: [us] }) => us <= at) ?? frames[0];
-    const label = spanAt(truth, at)?.name ?? null, [, other] = tracks;
+    const label = spanAt(truth, at)?.name ?? null;
     this.#view.take(frame);
     const bad = label !== null && differs(frame.grasp, label);
     say($("truth"), label === null ? "Truth: no label" : bad ? `✗ Truth: ${label}, announced: ${frame.grasp}` : `Truth: ${label}`);
     for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
-    if (!other) return;
-    const second = spanAt(other.announced, at)?.name ?? "nothing", wrong = label !== null && differs(second, label);
-    say($("other"), `${wrong ? "✗ " : ""}${other.name}: ${second}`);
-    $("other").classList.toggle("wrong", wrong);
   }
 
   // Ask for the moments of the next second that is missing at the cursor; one request at a time.

@@ -39,8 +39,7 @@ export class View {
     this.frame = null; // what comes next is drawn, even if it is the same
     this.#silent = (build.silent_us ?? Infinity) / 1000;
     this.switches = build.switches;
-    this.joints = build.joints;
-    this.taxels = build.hand.taxels;
+    this.hand = build.hand;
     this.drawing = drawHand($("hand"), build.hand);
     const styles = typeStyles(build.grasps);
     this.rows = new Map(build.grasps.map((grasp) => {
@@ -121,8 +120,8 @@ export class View {
     tell("health", health);
     say($("why"), means);
     this.drawing.setClosed(closed, gone);
-    this.drawing.setPose((frame.joints ?? []).map((value, at) => (frame.lost.includes(this.joints[at]) ? null : value)));
-    this.drawing.setTaxels(this.taxels.map(({ name }) => frame.taxels[name] ?? null));
+    this.drawing.setPose((frame.joints ?? []).map((value, at) => (frame.lost.includes(this.hand.joints[at].name) ? null : value)));
+    this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
     this.#announce(this.#old ? "no data" : frame.grasp, performance.now());
   }
 
