@@ -23,6 +23,9 @@ export class View {
   #readAt = null; // when the newest data was read
   #silent = Infinity; // how long a moment is current, in milliseconds: moments of a recording have no age
   #old = false;
+  #next = ""; // what screen readers are told next, or were told, and when
+  #spokenAt = -Infinity;
+  #timer = null;
   #draw = paced(() => this.frame && this.#show());
   #say = paced(() => this.frame && this.#words(), WORDS_MS);
 
@@ -30,7 +33,6 @@ export class View {
     this.frame = null;
     this.rows = new Map();
     this.quarantined = [];
-    this.said = { text: "", at: 0, since: 0, candidate: "" };
     setInterval(() => this.#look(), LOOK_MS);
   }
 
@@ -86,8 +88,7 @@ export class View {
   /** Tell news, also to screen readers. */
   tell(words) {
     say($("news"), words);
-    Object.assign(this.said, { text: words, at: performance.now() });
-    say($("spoken"), words);
+    this.#announce(words, 0);
   }
 
   #look() {
@@ -99,7 +100,7 @@ export class View {
     document.documentElement.classList.toggle("old", old);
     this.#title();
     this.#draw();
-    if (old) this.#announce("no data", performance.now(), true);
+    if (old) this.#announce("no data", 0);
   }
 
   #title() {
@@ -122,7 +123,7 @@ export class View {
     this.drawing.setClosed(closed, gone);
     this.drawing.setPose((frame.joints ?? []).map((value, at) => (frame.lost.includes(this.hand.joints[at].name) ? null : value)));
     this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
-    this.#announce(this.#old ? "no data" : frame.grasp, performance.now());
+    if (!this.#old) this.#announce(frame.grasp);
   }
 
   // Which switches are lost, and which of the others are closed.
@@ -167,13 +168,13 @@ export class View {
   }
 
   // For screen readers: a text that was stable for a second, at most every three seconds.
-  #announce(grasp, now, atOnce = false) {
-    const { said } = this;
-    if (said.candidate !== grasp) Object.assign(said, { candidate: grasp, since: now });
-    const settled = now - said.since >= SETTLED_MS && now - said.at >= QUIET_MS;
-    if (grasp !== said.text && (atOnce || settled)) {
-      Object.assign(said, { text: grasp, at: now });
-      say($("spoken"), grasp);
-    }
+  #announce(text, wait = Math.max(SETTLED_MS, this.#spokenAt + QUIET_MS - performance.now())) {
+    if (text === this.#next) return;
+    this.#next = text;
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => {
+      this.#spokenAt = performance.now();
+      say($("spoken"), text);
+    }, wait);
   }
 }
