@@ -177,18 +177,18 @@ function posed(angles) {
   // It bends across the palm: the less it is opposed, the more it is turned to it.
   const bends = [0, at("thumb", "mcp", curl * 0.6), at("thumb", "ip", curl)];
   chains.thumb = chain(ahead.rotateAxisAngle(0, 1, 0, (round - 72) * 0.9), lengths, bends);
-  const palm = PALM.map((point) => (typeof point === "string" ? chains[point][0] : placed(wrist.translate(...point))));
-  return { chains, palm, forearm: [[-18, 4], [-17, -34], [17, -34], [18, 4]].map((point) => placed(VIEW.translate(...point))) };
+  const palm = PALM.map((point) => (typeof point === "string" ? chains[point][0] : seenAt(wrist.translate(...point))));
+  return { chains, palm, forearm: [[-18, 4], [-17, -34], [17, -34], [18, 4]].map((point) => seenAt(VIEW.translate(...point))) };
 }
 
 // Where the origin of a coordinate system is seen.
-const placed = ({ e, f }) => [e, f];
+const seenAt = ({ e, f }) => [e, f];
 
 function chain(bone, lengths, bends) {
-  const points = [placed(bone)];
+  const points = [seenAt(bone)];
   lengths.forEach((length, at) => {
     bone = bone.rotateAxisAngle(1, 0, 0, bends[at]).translate(0, length);
-    points.push(placed(bone));
+    points.push(seenAt(bone));
   });
   return points;
 }
@@ -264,9 +264,9 @@ function unplaced(joints) {
  * setPose(values)        the value of each of hand.joints, in its unit; null: lost
  */
 export function drawHand(svg, hand, { onSwitch = null } = {}) {
-  const glove = new Glove(hand, onSwitch), placed = hand.joints.filter((joint) => joint.digit);
-  const others = hand.joints.filter((joint) => !joint.digit);
-  const joints = [...(placed.length ? [posedHand(placed)] : []), ...(others.length ? [unplaced(others)] : [])];
+  const glove = new Glove(hand, onSwitch);
+  const kinds = [[posedHand, hand.joints.filter(({ digit }) => digit)], [unplaced, hand.joints.filter(({ digit }) => !digit)]];
+  const joints = kinds.filter(([, some]) => some.length).map(([drawn, some]) => drawn(some));
   const parts = [...(glove.box ? [glove] : []), ...joints];
   svg.replaceChildren(glove.group, ...joints.map(({ group }) => group));
   svg.classList.add("hand");

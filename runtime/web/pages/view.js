@@ -36,7 +36,7 @@ export class View {
     setInterval(() => this.#look(), LOOK_MS);
   }
 
-  /** Take the grasp types, switches, joints and hand of the build, and how long a moment of its run is current. */
+  /** Take the grasp types, switches and hand of the build, and how long a moment of its run is current. */
   begin(build) {
     this.frame = null; // what comes next is drawn, even if it is the same
     this.#silent = (build.silent_us ?? Infinity) / 1000;
