@@ -63,13 +63,12 @@ export class View {
   /** Take a moment. */
   take(frame) {
     if (frame === this.frame) return;
-    const news = frame.grasp !== this.frame?.grasp;
     this.frame = frame;
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     if (ages.length && this.#silent < Infinity) this.#readAt = performance.now() - (Math.min(...ages) + frame.late_us) / 1000;
     this.#look();
     this.#draw();
-    this.#say(news);
+    this.#say();
   }
 
   /** Take the health of devices and inputs. */
