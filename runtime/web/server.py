@@ -183,7 +183,7 @@ class Server(Closing):
             await self._server.shutdown(_CLOSING_S)
 
     def _connection(self) -> asyncio.Protocol:
-        """Return what serves a new connection."""
+        """Return the protocol of a new connection."""
         handler = self._server()
 
         def end_unless(may_stay: Callable[[], bool]) -> None:

@@ -23,7 +23,7 @@ export class View {
   #readAt = null; // when the newest data was read
   #silent = Infinity; // how long a moment is current, in milliseconds: moments of a recording have no age
   #old = false;
-  #next = ""; // what screen readers are told next, or were told, and when
+  #next = ""; // the last words for screen readers, and when they were said
   #spokenAt = -Infinity;
   #timer = null;
   #draw = paced(() => this.frame && this.#show());
