@@ -28,13 +28,11 @@ from .live import FrameText, Past, build_message, change_of, silent_us
 from .server import message
 
 # The interval of moments that are kept; the most changes of a build, or labels, that the overview holds.
-_SAMPLE_US, _MOST_CHANGES = 20_000, 200_000
+_SAMPLE_US, _MOST_CHANGES = 20_000, 40_000
 _PERIODS_OF = 20_000
-# Of one reply: entries of each list of the overview, moments, and bytes of these.
-MOST_ENTRIES, MOST_MOMENTS, MOST_BYTES = 4_000, 64, 262_144
+# Of one reply: bytes of moments.
+MOST_BYTES = 1 << 20
 _LARGEST = 2**62
-# The number of a trial, its span, and its type; an empty span revokes the trial.
-Truth = tuple[int, int, int, str]
 
 
 class Replay(Closing):
@@ -84,7 +82,8 @@ class Replay(Closing):
         self._first_us: int | None = None
         self._last_us = 0
         self._pasts = [Past() for _ in builds]
-        self._truth = list[Truth]()
+        # The span and the type of each trial, by its number.
+        self._truth = dict[int, tuple[int, int, str]]()
         self._begun_us: int | None = None
         self._times, self._ends = array("q"), array("q", (0,))
         self._faults, self._scanned, self._stop = list[str](), Event(), Event()
@@ -104,9 +103,8 @@ class Replay(Closing):
         Parameters
         ----------
         asked : mapping
-            `do` is "overview", for the changes and labels that the page has not got yet, or "moments". `numbers` are,
-            of the overview, how many changes of each build, and labels, it has; of moments, the first time, the last,
-            and their interval, in microseconds since 1970.
+            `do` is "overview", for the changes and labels that were read so far, or "moments", of which `numbers` has
+            the second since 1970.
 
         Raises
         ------
@@ -116,44 +114,37 @@ class Replay(Closing):
         do, numbers = asked.get("do"), asked.get("numbers")
         if do not in ("overview", "moments"):
             raise SettingError(f"a page can ask for the overview or for moments of a recording, not {str(do)[:20]!r}")
-        count = 3 if do == "moments" else len(self._builds) + 1
-        if not isinstance(numbers, list | tuple) or len(numbers) != count or not all(map(_is_number, numbers)):
-            raise SettingError(f"for the {do} of a recording, a page must send {count} whole numbers below 2^62")
-        return self._moments(*numbers) if do == "moments" else self._overview(numbers)
+        if do == "overview":
+            return self._overview()
+        second = numbers[0] if isinstance(numbers, list | tuple) and len(numbers) == 1 else None
+        if not isinstance(second, int) or isinstance(second, bool) or abs(second) >= _LARGEST:
+            raise SettingError("for the moments of a recording, a page must send a whole number below 2^62")
+        return self._moments(second)
 
-    def _overview(self, have: Sequence[int]) -> bytes:
+    def _overview(self) -> bytes:
         scanned = self._scanned.is_set()
-        lists: list[Sequence[object]] = [*(past.changes for past in self._pasts), self._truth]
-        *changes, truth = [found[max(n, 0) : max(n, 0) + MOST_ENTRIES] for n, found in zip(have, lists, strict=True)]
         return message(
             "overview",
-            have=have,
-            changes=changes,
-            truth=truth,
+            changes=[[*past.changes] for past in self._pasts],
+            truth=sorted(self._truth.values()),
             first_us=self._first_us,
             last_us=self._last_us,
             share=1.0 if scanned else min(self._reader.tail.size / max(self._size, 1), 0.999),
             faults=self._faults[:8],
         )
 
-    def _moments(self, first_us: int, last_us: int, step_us: int) -> bytes:
-        """Return the moment that was current at `first_us`, and later ones; "to" says up to when these are all."""
-        times, texts, size = self._times, list[bytes](), 0
-        scanned, count = self._scanned.is_set(), len(times)
-        if not scanned:
-            last_us = min(last_us, times[count - 1] if count else first_us - 1)
-        to_us, number = last_us, max(bisect_right(times, first_us, hi=count) - 1, 0)
-        # The moment at a time that was not read yet is not known.
-        while number < count and (scanned or first_us <= last_us) and (not texts or times[number] <= last_us):
-            if len(texts) == MOST_MOMENTS or size > MOST_BYTES:
-                to_us = times[number] - 1
-                break
-            begin, end = self._ends[number : number + 2]
-            texts.append(os.pread(self._kept.fileno(), end - begin, begin))
-            size += end - begin
-            number = max(bisect_left(times, times[number] + step_us, hi=count), number + 1)
-        head = message("moments", from_us=first_us, to_us=to_us)
-        return head[:-1] + b',"frames":[' + b",".join(texts) + b"]}"
+    def _moments(self, second: int) -> bytes:
+        """Return the moment that was current when a second began, and those in it; none before it was read whole."""
+        scanned, count = self._scanned.is_set(), len(self._times)
+        first = max(bisect_right(self._times, 1_000_000 * second, hi=count) - 1, 0)
+        end = bisect_left(self._times, 1_000_000 * (second + 1), first, count)
+        texts = b""
+        if count and (scanned or end < count):
+            begin = self._ends[first]
+            most = bisect_right(self._ends, begin + MOST_BYTES, hi=count + 1) - 1
+            end = max(min(end, most), first + 1)
+            texts = os.pread(self._kept.fileno(), self._ends[end] - begin, begin)
+        return message("moments", second=second)[:-1] + b',"frames":[' + texts[:-1] + b"]}"
 
     def _scan(self) -> None:
         """Recognise the whole recording: fill the overview, and keep what pages show."""
@@ -212,19 +203,16 @@ class Replay(Closing):
     def _label(self, unix_us: int, label: Label) -> None:
         if label.event == "begun" or self._begun_us is None:
             self._begun_us = unix_us
-        if label.event in ("accepted", "undone") and len(self._truth) < _MOST_CHANGES:
-            span = (self._begun_us, unix_us, label.grasp) if label.event == "accepted" else (0, 0, "")
-            self._truth.append((label.trial, *span))
+        if label.event == "undone":
+            self._truth.pop(label.trial, None)
+        if label.event == "accepted" and len(self._truth) < _MOST_CHANGES:
+            self._truth[label.trial] = self._begun_us, unix_us, label.grasp
         if label.event in ("accepted", "redone"):
             self._begun_us = None
 
     def _keep(self, moment: Moment) -> None:
         """Keep the message of a moment. The server's thread reads it once its time is in the list."""
-        text = self._text(moment, self._clock_us)
+        text = self._text(moment, self._clock_us) + b","
         self._kept.write(text)
         self._ends.append(self._ends[-1] + len(text))
         self._times.append(self._clock_us + moment.grasp.time_us)
-
-
-def _is_number(given: object) -> bool:
-    return isinstance(given, int) and not isinstance(given, bool) and abs(given) < _LARGEST

@@ -6,7 +6,6 @@ import { $, clearedPen, colours, paced, redraw, say, WORDS_MS } from "./wire.js"
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
-const FOLLOW_MS = 100; // the lanes of a run move ten times a second at most
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
@@ -97,13 +96,12 @@ export class Timeline {
   #wide = 0;
   #whole = false; // while a recording is read, the window has all of it, until somebody zooms
   #styles = typeStyles([]);
-  #colours = null; // of the page, as long as they and the canvas are the same
-  #pen = null;
+  #colours = null;
   #pointers = new Map();
   #moved = 0;
   #stale = true; // the lanes, and not just the cursor
   #paint = paced(() => this.#draw());
-  #follow = paced(() => this.#draw(), FOLLOW_MS);
+  #follow = paced(() => this.#draw(), WORDS_MS); // the lanes of a run move as often as its words change
   #say = paced(() => this.#read(), WORDS_MS);
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
@@ -119,11 +117,7 @@ export class Timeline {
     for (const kind of ["down", "move", "up", "cancel"]) {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
-    redraw(canvas, () => {
-      [this.#pen, this.#wide, this.#colours] = [clearedPen(canvas), canvas.clientWidth, colours()];
-      this.#stale = true;
-      this.#draw(); // at once: it is cleared
-    });
+    redraw(canvas, () => this.draw());
     const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
     for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
     addEventListener("keydown", (event) => this.#key(event));
@@ -159,13 +153,20 @@ export class Timeline {
     this.#say();
   }
 
-  /** Take the span of a recording and where its predictions differ from the labels. */
-  recorded(first, last) {
+  /** Take the changes of each build on a recording, the spans of its labels, and its own. */
+  recorded(changes, truth, first, last) {
     const fresh = this.last === null;
     [this.first, this.last] = [first, last];
     if (fresh || this.#whole) this.#show(first, last - first);
     this.#whole = fresh || this.#whole;
-    for (const track of this.tracks) track.errors = errors(this.truth, track.announced);
+    this.truth = truth.map(([from, to, name]) => ({ from, to, name }));
+    this.tracks = this.tracks.map(({ name }, number) => {
+      const track = new Track(name);
+      changes[number].forEach((change) => track.take(change));
+      track.untilUs = last;
+      track.errors = errors(this.truth, track.announced);
+      return track;
+    });
     for (const id of ["next-error", "last-error"]) $(id).disabled = this.tracks.every(({ errors: { wrong } }) => !wrong.length);
     this.draw();
   }
@@ -226,11 +227,11 @@ export class Timeline {
   }
 
   #drawLanes() {
-    const lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, pen = this.#pen, wide = this.#wide;
+    const lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, wide = this.canvas.clientWidth;
     if (this.canvas.style.height !== `${high}px`) this.canvas.style.height = `${high}px`;
     if (!wide) return;
-    const x = (us) => ((us - this.#from) / this.#span) * wide;
-    pen.clearRect(0, 0, wide, high);
+    [this.#wide, this.#colours] = [wide, colours()];
+    const pen = clearedPen(this.canvas), x = (us) => ((us - this.#from) / this.#span) * wide;
     pen.font = `${LETTERS}px system-ui, sans-serif`;
     pen.textBaseline = "middle";
     lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));
