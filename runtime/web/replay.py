@@ -28,11 +28,13 @@ from .live import FrameText, Past, build_message, change_of, silent_us
 from .server import message
 
 # The interval of moments that are kept; the most changes of a build, or labels, that the overview holds.
-_SAMPLE_US, _MOST_CHANGES = 20_000, 40_000
+_SAMPLE_US, _MOST_CHANGES = 20_000, 200_000
 _PERIODS_OF = 20_000
-# Of one reply: bytes of moments.
-MOST_BYTES = 1 << 20
+# Of one reply: entries of each list of the overview, and bytes of moments.
+MOST_ENTRIES, MOST_BYTES = 4_000, 1 << 20
 _LARGEST = 2**62
+# The number of a trial, its span, and its type; an empty span revokes the trial.
+Truth = tuple[int, int, int, str]
 
 
 class Replay(Closing):
@@ -82,8 +84,7 @@ class Replay(Closing):
         self._first_us: int | None = None
         self._last_us = 0
         self._pasts = [Past() for _ in builds]
-        # The span and the type of each trial, by its number.
-        self._truth = dict[int, tuple[int, int, str]]()
+        self._truth = list[Truth]()
         self._begun_us: int | None = None
         self._times, self._ends = array("q"), array("q", (0,))
         self._faults, self._scanned, self._stop = list[str](), Event(), Event()
@@ -103,8 +104,8 @@ class Replay(Closing):
         Parameters
         ----------
         asked : mapping
-            `do` is "overview", for the changes and labels that were read so far, or "moments", of which `numbers` has
-            the second since 1970.
+            `do` is "overview", for the changes and labels that the page has not got yet, or "moments". `numbers` are,
+            of the overview, how many changes of each build, and labels, it has; of moments, the second since 1970.
 
         Raises
         ------
@@ -114,19 +115,20 @@ class Replay(Closing):
         do, numbers = asked.get("do"), asked.get("numbers")
         if do not in ("overview", "moments"):
             raise SettingError(f"a page can ask for the overview or for moments of a recording, not {str(do)[:20]!r}")
-        if do == "overview":
-            return self._overview()
-        second = numbers[0] if isinstance(numbers, list | tuple) and len(numbers) == 1 else None
-        if not isinstance(second, int) or isinstance(second, bool) or abs(second) >= _LARGEST:
-            raise SettingError("for the moments of a recording, a page must send a whole number below 2^62")
-        return self._moments(second)
+        count = 1 if do == "moments" else len(self._builds) + 1
+        if not isinstance(numbers, list | tuple) or len(numbers) != count or not all(map(_is_number, numbers)):
+            raise SettingError(f"for the {do} of a recording, a page must send whole numbers below 2^62, {count} in all")
+        return self._moments(*numbers) if do == "moments" else self._overview(numbers)
 
-    def _overview(self) -> bytes:
+    def _overview(self, have: Sequence[int]) -> bytes:
         scanned = self._scanned.is_set()
+        lists: list[Sequence[object]] = [*(past.changes for past in self._pasts), self._truth]
+        *changes, truth = [found[max(n, 0) : max(n, 0) + MOST_ENTRIES] for n, found in zip(have, lists, strict=True)]
         return message(
             "overview",
-            changes=[[*past.changes] for past in self._pasts],
-            truth=sorted(self._truth.values()),
+            have=have,
+            changes=changes,
+            truth=truth,
             first_us=self._first_us,
             last_us=self._last_us,
             share=1.0 if scanned else min(self._reader.tail.size / max(self._size, 1), 0.999),
@@ -134,17 +136,20 @@ class Replay(Closing):
         )
 
     def _moments(self, second: int) -> bytes:
-        """Return the moment that was current when a second began, and those in it; none before it was read whole."""
+        """Return the moment that was current when a second began, and those in it; none before it was read whole. Of too
+        many, every second or third is returned, and so on.
+        """
         scanned, count = self._scanned.is_set(), len(self._times)
         first = max(bisect_right(self._times, 1_000_000 * second, hi=count) - 1, 0)
         end = bisect_left(self._times, 1_000_000 * (second + 1), first, count)
-        texts = b""
+        texts = list[bytes]()
         if count and (scanned or end < count):
-            begin = self._ends[first]
-            most = bisect_right(self._ends, begin + MOST_BYTES, hi=count + 1) - 1
-            end = max(min(end, most), first + 1)
-            texts = os.pread(self._kept.fileno(), self._ends[end] - begin, begin)
-        return message("moments", second=second)[:-1] + b',"frames":[' + texts[:-1] + b"]}"
+            end = max(end, first + 1)
+            step = 1 + (self._ends[end] - self._ends[first]) // MOST_BYTES
+            for number in range(first, end, step):
+                begin, behind = self._ends[number : number + 2]
+                texts.append(os.pread(self._kept.fileno(), behind - begin, begin))
+        return message("moments", second=second)[:-1] + b',"frames":[' + b",".join(texts) + b"]}"
 
     def _scan(self) -> None:
         """Recognise the whole recording: fill the overview, and keep what pages show."""
@@ -203,16 +208,19 @@ class Replay(Closing):
     def _label(self, unix_us: int, label: Label) -> None:
         if label.event == "begun" or self._begun_us is None:
             self._begun_us = unix_us
-        if label.event == "undone":
-            self._truth.pop(label.trial, None)
-        if label.event == "accepted" and len(self._truth) < _MOST_CHANGES:
-            self._truth[label.trial] = self._begun_us, unix_us, label.grasp
+        if label.event in ("accepted", "undone") and len(self._truth) < _MOST_CHANGES:
+            span = (self._begun_us, unix_us, label.grasp) if label.event == "accepted" else (0, 0, "")
+            self._truth.append((label.trial, *span))
         if label.event in ("accepted", "redone"):
             self._begun_us = None
 
     def _keep(self, moment: Moment) -> None:
         """Keep the message of a moment. The server's thread reads it once its time is in the list."""
-        text = self._text(moment, self._clock_us) + b","
+        text = self._text(moment, self._clock_us)
         self._kept.write(text)
         self._ends.append(self._ends[-1] + len(text))
         self._times.append(self._clock_us + moment.grasp.time_us)
+
+
+def _is_number(given: object) -> bool:
+    return isinstance(given, int) and not isinstance(given, bool) and abs(given) < _LARGEST

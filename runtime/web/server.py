@@ -51,7 +51,7 @@ MOST_BYTES, MOST_PER_S, MOST_AT_ONCE = 16_384, 20.0, 40.0
 # Files that can be downloaded at the same time: a new one takes the place of the oldest.
 _MOST_OFFERED = 8
 # Replies that a page has not read, before it loses its place.
-MOST_UNREAD = 8 << 20
+MOST_UNREAD = 4 << 20
 _CLOSING_S = 0.5
 _ANY = {"0.0.0.0", "::"}
 
@@ -138,7 +138,7 @@ class Server(Closing):
         address = f"/offered/{secrets.token_urlsafe(12)}"
         saved = f"attachment; filename*=UTF-8''{quote(name, safe='', errors='replace')}"
         self._files[address] = content, {"Content-Type": "application/octet-stream", "Content-Disposition": saved}
-        for old in [path for path in self._files if path.startswith("/offered/")][:-_MOST_OFFERED]:
+        for old in [path for path in list(self._files) if path.startswith("/offered/")][:-_MOST_OFFERED]:
             del self._files[old]
         return address
 
@@ -190,8 +190,8 @@ class Server(Closing):
             if handler.transport is not None and not may_stay():
                 handler.transport.abort()
 
-        # As soon as it has a transport; and once it had time to fetch a file.
-        self._loop.call_later(0, end_unless, lambda: len(self._server.connections) <= MOST_CONNECTIONS)
+        # As soon as it has a transport, if it came after as many as there may be; and once it had time to fetch a file.
+        self._loop.call_later(0, end_unless, lambda: handler in self._server.connections[:MOST_CONNECTIONS])
         self._loop.call_later(
             _FETCH_S, end_unless, lambda: any(page.transport is handler.transport for page in self._pages)
         )

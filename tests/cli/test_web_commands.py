@@ -163,7 +163,7 @@ def test_a_recording_is_shown_from_any_moment_of_it_to_each_page(
         assert about["hand"]["switches"]
         overview: dict[str, Any] = {"share": 0.0}
         while overview["share"] < 1:
-            ask(live, do="overview")
+            ask(live, do="overview", numbers=[0, 0])
             overview = told(live, "overview")
         assert (overview["truth"], overview["faults"]) == ([], [])
         assert overview["changes"][0][0][1] == "unknown"
@@ -182,7 +182,7 @@ def test_a_recording_is_shown_from_any_moment_of_it_to_each_page(
             assert reply["topic"] in ("shell", "replay")
         assert reply["frames"][0]["number"] == 0
         ask(live, do="moments", numbers=["x"])
-        assert "for the moments of a recording, a page must send a whole number" in told(live, "refused")["why"]
+        assert "for the moments of a recording, a page must send whole numbers" in told(live, "refused")["why"]
         ask(live, do="moments")
         assert told(live, "refused")["do"] == "moments"
         ask(live, do="delete")
@@ -201,7 +201,7 @@ def test_two_builds_stand_side_by_side_and_three_are_too_many(
     with monitor.page() as live:
         # Of the same name, they are told apart by their paths.
         assert told(live, "replay")["builds"] == [str(build_folder)] * 2
-        ask(live, do="overview")
+        ask(live, do="overview", numbers=[0, 0, 0])
         one, other = told(live, "overview")["changes"]
         assert one == other
     assert monitor.end() == 0

@@ -217,7 +217,7 @@ def test_a_recording_that_went_on_is_shown_as_it_is_now(
         share, truth = 0.0, list[object]()
         while share < 1:
             with page(opened.server.url, "none") as live:
-                live.send(json.dumps({"do": "overview", "ids": ids}))
+                live.send(json.dumps({"do": "overview", "ids": ids, "numbers": [0, 0]}))
                 told = until(live, lambda told: told["topic"] == "overview")
                 share, truth = told["share"], told["truth"]
         assert len(truth) == trials

@@ -4,6 +4,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const NARROW = 560; // up to this width, in pixels, the parts are drawn one below the other
 const LEAST_UNIT = 0.3; // minimum millimetres per pixel, so that few inputs are not drawn huge
 const LETTER = 9.5; // minimum size of a letter, pixels
+const FINGER = 6; // minimum half size of a button, pixels, if there is room
 
 /** Return a new element of a drawing with these attributes, and texts and elements in it. */
 export function draw(kind, attributes = {}, ...children) {
@@ -66,6 +67,7 @@ class Glove {
     this.taxels = hand.taxels.map(({ name }) => this.spots.find((spot) => spot.disc && spot.name === name));
     const points = [...hand.outline, ...hand.strips.flat(), ...[...all, ...hand.labels].map((one) => [one.x_mm, one.y_mm])];
     this.box = points.length ? around(points, hand.placed ? [12, 5] : [22, 16]) : null;
+    this.spacing = spacing(kept);
   }
 
   #place({ name, x_mm, y_mm }, ...parts) {
@@ -79,7 +81,7 @@ class Glove {
   // A switch: a ring, and closed a full square, larger, on a corner. A taxel: a square, and in it a disc that shows how
   // far it is pressed; with all levels closed the square is full. Lost: a cross in a dashed line.
   #spot(one, bits, onSwitch) {
-    const r = this.#hand.radius_mm, side = 1.35 * r;
+    const r = this.#hand.radius_mm, side = 1.35 * r, area = draw("circle", { class: "area", r: 2 * r });
     const disc = one.levels ? draw("circle", { class: "press", r: 0 }) : null, parts = disc
       ? [
         draw("rect", { class: "open", x: -side, y: -side, width: 2 * side, height: 2 * side }),
@@ -91,7 +93,7 @@ class Glove {
         draw("path", { class: "shut", d: `M0 ${-2 * r}L${2 * r} 0L0 ${2 * r}L${-2 * r} 0Z` }),
       ];
     const cross = draw("path", { class: "cross", d: `M${-r} ${-r}L${r} ${r}M${r} ${-r}L${-r} ${r}` });
-    const group = this.#place(one, ...parts, cross), spot = { name: one.name, bits, group, disc, count: 0, value: null };
+    const group = this.#place(one, ...parts, cross), spot = { name: one.name, bits, group, disc, area, count: 0, value: null };
     if (!onSwitch) return spot;
     // From level to level, and from the last to none.
     const press = () => {
@@ -100,7 +102,7 @@ class Glove {
         if (!this.#closed[bit] === at < next) onSwitch(bit, at < next);
       });
     };
-    pressable(group, one.name, press).append(draw("circle", { class: "area", r: 2 * r }));
+    pressable(group, one.name, press).append(area);
     return spot;
   }
 
@@ -132,6 +134,27 @@ class Glove {
       this.#press(taxel, value ?? taxel.count / taxel.bits.length);
     });
   }
+
+  // One pixel of the screen is `unit` of the drawing.
+  fit(unit) {
+    const reach = Math.max(2 * this.#hand.radius_mm, Math.min(2 * FINGER * unit, this.spacing / 2));
+    for (const { area } of this.spots) area.setAttribute("r", reach.toFixed(2));
+  }
+
+  get said() {
+    const switches = this.spots.filter(({ disc }) => !disc), closed = switches.filter(({ count }) => count).length;
+    return switches.length ? `: ${closed} of ${switches.length} switches closed` : "";
+  }
+}
+
+function spacing(places) {
+  let least = Infinity;
+  places.forEach((one, at) => {
+    for (const other of places.slice(at + 1)) {
+      least = Math.min(least, Math.hypot(one.x_mm - other.x_mm, one.y_mm - other.y_mm));
+    }
+  });
+  return least;
 }
 
 /* ---- The posed hand: a right hand, seen from the side of its thumb; x to the thumb, y to the tips, z off the palm ---- */
@@ -271,7 +294,8 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
   svg.replaceChildren(glove.group, ...joints.map(({ group }) => group));
   svg.classList.add("hand");
   svg.setAttribute("role", onSwitch ? "group" : "img");
-  svg.setAttribute("aria-label", "The hand");
+  const say = () => svg.setAttribute("aria-label", `The hand${onSwitch ? "" : glove.said}`);
+  say();
 
   let wide = -1;
   const arrange = () => {
@@ -290,13 +314,18 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
     }
     const [broad, tall] = narrow ? [across, y] : [x, high], whole = Math.max(broad, LEAST_UNIT * width);
     svg.setAttribute("viewBox", `${((broad - whole) / 2).toFixed(1)} 0 ${whole.toFixed(1)} ${tall.toFixed(1)}`);
-    svg.style.setProperty("--letter", `${((LETTER * whole) / width).toFixed(2)}px`);
+    const unit = whole / width;
+    svg.style.setProperty("--letter", `${(LETTER * unit).toFixed(2)}px`);
+    if (glove.box) glove.fit(unit);
   };
   arrange();
   new ResizeObserver(arrange).observe(svg);
 
   return {
-    setClosed: (bits, lost) => glove.setClosed(bits, lost),
+    setClosed(bits, lost) {
+      glove.setClosed(bits, lost);
+      if (!onSwitch) say();
+    },
     setTaxels: (values) => glove.setTaxels(values),
     setPose(values) {
       for (const part of joints) part.set(values);

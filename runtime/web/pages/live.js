@@ -34,6 +34,8 @@ function longest(announced, { from, to }, until) {
 
 /** The recording: this page's position in it, which plays here, and what it asks the server for. */
 class Replay {
+  #labels = new Map(); // spans by the number of their trial
+  #counts = [];
   #seconds = new Map(); // moments, by their second since 1970
   #asking = false; // for moments
   #asked = 0;
@@ -49,25 +51,42 @@ class Replay {
 
   /** Begin, or begin again after the server came back: the position stays. */
   begin() {
+    this.#labels.clear();
+    this.#counts = [...timeline.tracks, this.#labels].map(() => 0);
     this.#seconds.clear();
     this.#asking = false;
-    ask("overview", { ids });
+    this.#more();
     this.moved();
   }
 
-  /** Take what was read so far. */
-  overview({ changes, truth, first_us, last_us, share, faults }) {
+  #more() {
+    ask("overview", { numbers: this.#counts, ids });
+  }
+
+  /** Take what was read since. */
+  overview({ have, changes, truth, first_us, last_us, share, faults }) {
+    if (String(have) !== String(this.#counts)) return;
+    const { tracks } = timeline, lists = [...changes, truth];
+    changes.forEach((some, number) => some.forEach((change) => tracks[number].take(change)));
+    for (const [trial, from, to, name] of truth) {
+      if (name) this.#labels.set(trial, { from, to, name });
+      else this.#labels.delete(trial);
+    }
+    timeline.truth = [...this.#labels.values()].sort((one, other) => one.from - other.from);
+    this.#counts = have.map((count, number) => count + lists[number].length);
     this.#share = share;
     say($("scanned"), share < 1 ? `${Math.floor(100 * share)} % of the file is read` : "");
     say($("faults"), faults.join(" "));
     if (first_us !== null) {
-      timeline.recorded(changes, truth, first_us, Math.max(last_us, first_us + 1));
+      for (const track of tracks) track.untilUs = last_us;
+      timeline.recorded(first_us, Math.max(last_us, first_us + 1));
       this.#link(this.#wanted);
       if (timeline.at === null) timeline.seek(first_us);
       else this.moved();
       this.#rate();
     }
-    if (share < 1) setTimeout(() => ask("overview", { ids }), LATER_MS);
+    const more = lists.some((list) => list.length);
+    if (share < 1 || more) setTimeout(() => this.#more(), more ? ASK_MS : LATER_MS);
   }
 
   /** Take the moments of a second; none were read yet if there are none. */
@@ -114,7 +133,7 @@ class Replay {
 
   // Show the moment at the cursor, if it has come, and compare it with the label.
   #show() {
-    const { at, truth } = timeline, frames = this.#seconds.get(secondOf(at));
+    const { at, truth, tracks: [, other] } = timeline, frames = this.#seconds.get(secondOf(at));
     if (!frames) return;
     const frame = frames.findLast(({ change: [us] }) => us <= at) ?? frames[0];
     const label = spanAt(truth, at)?.name ?? null;
@@ -122,6 +141,10 @@ class Replay {
     const bad = label !== null && differs(frame.grasp, label);
     say($("truth"), label === null ? "Truth: no label" : bad ? `✗ Truth: ${label}, announced: ${frame.grasp}` : `Truth: ${label}`);
     for (const id of ["truth", "grasp"]) $(id).classList.toggle("wrong", bad);
+    if (!other) return;
+    const second = spanAt(other.announced, at)?.name ?? "nothing", wrong = label !== null && differs(second, label);
+    say($("other"), `${wrong ? "✗ " : ""}${other.name}: ${second}`);
+    $("other").classList.toggle("wrong", wrong);
   }
 
   // Ask for the moments of the next second that is missing at the cursor; one request at a time.
@@ -187,6 +210,7 @@ const ask = openPage({
   ...(ids.length ? {} : run),
   replay: (recording) => {
     for (const one of document.querySelectorAll("[data-of]")) one.hidden = one.dataset.of !== "recording";
+    $("other").hidden = recording.builds.length < 2;
     begin(recording);
     replay.begin();
   },

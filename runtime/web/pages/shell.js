@@ -2,7 +2,7 @@
 // what it refuses.
 import { $, button, clock, make, say, tell } from "./wire.js";
 
-const AGAIN_MS = 500;
+const FIRST_MS = 250, LONGEST_MS = 5000; // before it connects again
 
 /** What the server does, in words. */
 export const WORK = {
@@ -18,7 +18,7 @@ export const WORK = {
  * refused is said in #refused
  */
 export function openPage(handlers) {
-  let socket, lasts; // until what is said of the glove is too old
+  let socket, wait = FIRST_MS, lasts; // until what is said of the glove is too old
   const badges = ["wearer", "glove-state", "build-state", "link"].map((id) => make("span", { id, class: "badge", hidden: true }));
   const title = make("h1", {}, make("span", { class: "brand" }, "thenar"), " ", make("span", { id: "name" }));
   const pages = make("nav", { id: "pages", "aria-label": "Pages" });
@@ -48,12 +48,16 @@ export function openPage(handlers) {
   const take = (message) => [own, handlers].forEach((some) => some[message.topic]?.(message));
   const topics = new Set([own, handlers].flatMap(Object.keys));
   function open() {
-    socket = new WebSocket(`/live?topics=${[...topics]}`);
-    socket.addEventListener("open", () => take({ topic: "open" }));
+    socket = new WebSocket(new URL(`/live?topics=${[...topics]}`, location.href.replace("http", "ws")));
+    socket.addEventListener("open", () => {
+      wait = FIRST_MS;
+      take({ topic: "open" });
+    });
     socket.addEventListener("message", (event) => take(JSON.parse(event.data)));
     socket.addEventListener("close", () => {
       take({ topic: "closed" });
-      setTimeout(open, AGAIN_MS);
+      setTimeout(open, wait);
+      wait = Math.min(2 * wait, LONGEST_MS);
     });
   }
   function ask(what, more = {}) {

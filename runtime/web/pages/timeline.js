@@ -6,6 +6,7 @@ import { $, clearedPen, colours, paced, redraw, say, WORDS_MS } from "./wire.js"
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
+const FOLLOW_MS = 100; // the lanes of a run move ten times a second at most
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
@@ -101,7 +102,7 @@ export class Timeline {
   #moved = 0;
   #stale = true; // the lanes, and not just the cursor
   #paint = paced(() => this.#draw());
-  #follow = paced(() => this.#draw(), WORDS_MS); // the lanes of a run move as often as its words change
+  #follow = paced(() => this.#draw(), FOLLOW_MS);
   #say = paced(() => this.#read(), WORDS_MS);
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
@@ -153,20 +154,13 @@ export class Timeline {
     this.#say();
   }
 
-  /** Take the changes of each build on a recording, the spans of its labels, and its own. */
-  recorded(changes, truth, first, last) {
+  /** Take the span of a recording and where its predictions differ from the labels. */
+  recorded(first, last) {
     const fresh = this.last === null;
     [this.first, this.last] = [first, last];
     if (fresh || this.#whole) this.#show(first, last - first);
     this.#whole = fresh || this.#whole;
-    this.truth = truth.map(([from, to, name]) => ({ from, to, name }));
-    this.tracks = this.tracks.map(({ name }, number) => {
-      const track = new Track(name);
-      changes[number].forEach((change) => track.take(change));
-      track.untilUs = last;
-      track.errors = errors(this.truth, track.announced);
-      return track;
-    });
+    for (const track of this.tracks) track.errors = errors(this.truth, track.announced);
     for (const id of ["next-error", "last-error"]) $(id).disabled = this.tracks.every(({ errors: { wrong } }) => !wrong.length);
     this.draw();
   }

@@ -63,12 +63,13 @@ export class View {
   /** Take a moment. */
   take(frame) {
     if (frame === this.frame) return;
+    const news = frame.grasp !== this.frame?.grasp;
     this.frame = frame;
     const ages = [frame.switch_age_us, frame.glove_age_us].filter((age) => age !== null);
     if (ages.length && this.#silent < Infinity) this.#readAt = performance.now() - (Math.min(...ages) + frame.late_us) / 1000;
     this.#look();
     this.#draw();
-    this.#say();
+    this.#say(news);
   }
 
   /** Take the health of devices and inputs. */
@@ -171,9 +172,11 @@ export class View {
     if (text === this.#next) return;
     this.#next = text;
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => {
+    const speak = () => {
       this.#spokenAt = performance.now();
       say($("spoken"), text);
-    }, wait);
+    };
+    if (wait) this.#timer = setTimeout(speak, wait);
+    else speak(); // before another text can take its place
   }
 }

@@ -76,14 +76,15 @@ export const WORDS_MS = 200; // numbers and words change five times a second at 
 /**
  * Return the function that lets `paint` run in the next frame of the screen, but not again within `ms` milliseconds: of
  * calls that come sooner, the last one counts. So all that comes at one time is painted in one frame.
+ * @returns {function(boolean=): void} `atOnce` is in the next frame in any case
  */
 export function paced(paint, ms = 0) {
   let asked = false, last = -Infinity, timer = null;
-  return function ask() {
+  return function ask(atOnce = false) {
     const now = performance.now();
     if (asked) return;
     clearTimeout(timer);
-    if (now - last < ms) {
+    if (!atOnce && now - last < ms) {
       timer = setTimeout(ask, ms);
       return;
     }

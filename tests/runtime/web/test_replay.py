@@ -69,7 +69,7 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
 ) -> None:
     build, rows = Build.load(folder), (0b101, 0b11010, 0b111111)
     shown = replay(*rows)
-    overview = asked(shown, "overview")
+    overview = asked(shown, "overview", 0, 0)
     first, last = overview["first_us"], overview["last_us"]
     assert (overview["share"], overview["faults"]) == (1.0, [])
     for number, row in enumerate(rows):
@@ -81,11 +81,11 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
         announced = [change[1] for change in overview["changes"][0] if change[0] <= at][-1]
         assert announced == grasp
     # The last one is done again.
-    assert [(end - begun, kind) for begun, end, kind in overview["truth"]] == [
-        (HELD_US - 1, "hook"),
-        (HELD_US - 1, "pinch"),
+    assert [(trial, end - begun, kind) for trial, begun, end, kind in overview["truth"]] == [
+        (1, HELD_US - 1, "hook"),
+        (2, HELD_US - 1, "pinch"),
     ]
-    assert overview["truth"][1][0] - first == HELD_US
+    assert overview["truth"][1][1] - first == HELD_US
     (final,) = asked(shown, "moments", last // 10**6 + 1000)["frames"]
     assert last - 10_000 <= final["change"][0] <= last
     about = json.loads(shown.about)
@@ -100,12 +100,13 @@ def test_a_result_that_is_undone_leaves_no_label(folder: Path, tmp_path: Path) -
             recorder.frame(SwitchFrame(time_us, 1))
     with Replay(path, [folder]) as shown:
         assert shown._scanned.wait(60)
-        assert asked(shown, "overview")["truth"] == []
+        found = asked(shown, "overview", 0, 0)
+        assert found["truth"] == [[1, found["first_us"], found["first_us"] + 9, "hook"], [1, 0, 0, ""]]
 
 
 def test_pages_get_the_moments_of_each_second_that_they_ask_for(replay: Callable[..., Replay]) -> None:
     shown = replay(1, 2, 3)
-    overview = asked(shown, "overview")
+    overview = asked(shown, "overview", 0, 0)
     first, last = overview["first_us"], overview["last_us"]
     joined, newest = list[int](), first
     for second in range(first // 10**6 - 2, last // 10**6 + 3):
@@ -125,17 +126,30 @@ def test_pages_get_the_moments_of_each_second_that_they_ask_for(replay: Callable
     assert {change[0] for change in overview["changes"][0]} <= set(joined)
 
 
-def test_builds_are_read_at_the_same_time(replay: Callable[..., Replay]) -> None:
-    overview = asked(replay(1, 2, 4, 8, 16, 32, builds=2), "overview")
-    assert overview["changes"][0] == overview["changes"][1]
-    assert len(overview["truth"]) == 5
+def test_the_overview_comes_in_parts_that_join(replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = replay(1, 2, 4, 8, 16, 32, builds=2)
+    whole = asked(shown, "overview", 0, 0, 0)
+    assert whole["changes"][0] == whole["changes"][1]
+    monkeypatch.setattr(module, "MOST_ENTRIES", 2)
+    lists: list[list[Any]] = [[], [], []]
+    while True:
+        part = asked(shown, "overview", *map(len, lists))
+        assert part["have"] == [len(each) for each in lists]
+        more = [*part["changes"], part["truth"]]
+        assert max(map(len, more)) <= 2
+        for each, some in zip(lists, more, strict=True):
+            each += some
+        if not any(more):
+            break
+    assert lists == [*whole["changes"], whole["truth"]]
+    assert len(whole["truth"]) == 5
 
 
 def test_a_recording_of_too_many_changes_says_where_its_timeline_ends(
     replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "_MOST_CHANGES", 2)
-    overview = asked(replay(1, 2, 4, 8, 16, 32), "overview")
+    overview = asked(replay(1, 2, 4, 8, 16, 32), "overview", 0, 0)
     assert (len(overview["changes"][0]), len(overview["truth"])) == (2, 2)
     assert overview["faults"] == ["the timeline ends at 2 changes of the prediction, or labels"]
 
@@ -166,8 +180,10 @@ HUGE = 2**62
 )
 def test_what_is_no_number_is_refused_in_a_sentence(replay: Callable[..., Replay], numbers: object) -> None:
     shown = replay(1, 2)
-    with pytest.raises(SettingError, match="for the moments of a recording, a page must send a whole number"):
-        shown.reply({"do": "moments", "numbers": numbers})
+    for do, count, more in (("moments", 1, ()), ("overview", 2, (0,))):
+        given = [*numbers, *more] if isinstance(numbers, list | tuple) else numbers
+        with pytest.raises(SettingError, match=f"for the {do} of a recording, a page must send whole .*, {count} in all"):
+            shown.reply({"do": do, "numbers": given})
     others: tuple[object, ...] = ("delete", "", None, 1, [], "x" * 10**6)
     for wrong in others:
         with pytest.raises(SettingError, match="a page can ask for the overview or for moments") as refusal:
@@ -182,14 +198,17 @@ def test_whatever_span_is_asked_for_a_reply_is_bounded(
     edges = (-HUGE + 1, -1, 0, 1, 10**6, 5 * 10**6, HUGE - 1)
     for begin in edges:
         assert 1 <= len(asked(shown, "moments", begin)["frames"]) <= 102
-    second = asked(shown, "overview")["first_us"] // 10**6 + 1
+        for end in edges:
+            assert len(asked(shown, "overview", begin, end)["truth"]) <= 7
+    second = asked(shown, "overview", 0, 0)["first_us"] // 10**6 + 1
     whole = asked(shown, "moments", second)["frames"]
     monkeypatch.setattr(module, "MOST_BYTES", 2_000)
     text = shown.reply({"do": "moments", "numbers": (second,)})
     frames = json.loads(text)["frames"]
+    # Fewer of them are still of the whole second.
     assert 1 <= len(frames) < len(whole)
-    assert frames == whole[: len(frames)]
-    assert len(text) < 2_000 + 200
+    assert frames in [whole[::step] for step in range(2, len(whole))]
+    assert len(text) < 2_000 + max(len(json.dumps(frame)) for frame in frames) + 200
     monkeypatch.setattr(module, "MOST_BYTES", 1)
     assert asked(shown, "moments", second)["frames"] == whole[:1]
 
