@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -111,6 +112,52 @@ def test_a_page_without_its_server_says_since_when_there_is_no_data(page: Callab
     assert browser.text("glove-state") == "glove: not known"
     browser.wait(lambda: browser.text("health") == "no data")
     browser.log()  # of the server that is gone
+
+
+def test_a_page_asks_a_server_that_is_gone_less_and_less_often(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    browser.script("""const Real = WebSocket;
+        window.asked = [];
+        window.WebSocket = class extends Real {
+          constructor(address) {
+            asked.push([performance.now(), String(address)]);
+            super(address);
+          }
+        };""")
+    run.server.close()
+    browser.wait(lambda: browser.script("return asked.length") >= 4)
+    asked = browser.script("return asked")
+    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(asked)]
+    assert all(gap >= least - 2 for gap, least in zip(gaps, (500, 1000, 2000), strict=False))
+    # Browsers of some years ago take no others.
+    assert all(address.startswith("ws://127.0.0.1:") for _, address in asked)
+    browser.log()  # of the server that is gone
+
+
+# A drawing of switches of 1 mm, so many millimetres apart, on a small screen: where each can be pressed.
+_AREAS = """const [apart, done] = arguments;
+    import("/hand.js").then(({ drawHand, draw }) => {
+      const svg = draw("svg"), hand = { view: "", placed: true, radius_mm: 1, strips: [], creases: [], labels: [] };
+      svg.style.width = "240px";
+      document.body.append(svg);
+      const switches = [0, 1, 2].map((bit) => ({ name: `s${bit}`, x_mm: apart * bit, y_mm: 0, bit }));
+      const outline = [[-100, 0], [100, 0], [0, 100]];
+      drawHand(svg, { ...hand, outline, switches, taxels: [], joints: [] }, { onSwitch: () => {} });
+      done([...svg.querySelectorAll(".area")].map((area) => area.getBoundingClientRect()).map(({ left, right }) => [left, right]));
+      svg.remove();
+    });"""
+
+
+@pytest.mark.parametrize(("apart", "least"), [(45, 24), (12, 11)])
+def test_a_finger_presses_a_switch_on_a_small_screen(
+    page: Callable[..., Run], browser: Any, apart: int, least: int
+) -> None:
+    page()
+    areas = browser.driver.execute_async_script(_AREAS, apart)
+    assert len(areas) == 3
+    assert all(right - left > least - 0.5 for left, right in areas)
+    # None is on another.
+    assert all(right <= left + 0.5 for (_, right), (left, _) in pairwise(areas))
 
 
 def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run], browser: Any) -> None:
