@@ -117,7 +117,7 @@ class Replay(Closing):
             raise SettingError(f"a page can ask for the overview or for moments of a recording, not {str(do)[:20]!r}")
         count = 1 if do == "moments" else len(self._builds) + 1
         if not isinstance(numbers, list | tuple) or len(numbers) != count or not all(map(_is_number, numbers)):
-            raise SettingError(f"for the {do} of a recording, a page must send whole numbers below 2^62, {count} in all")
+            raise SettingError(f"for the {do} of a recording, a page must send {count} of `numbers`, below 2^62")
         return self._moments(*numbers) if do == "moments" else self._overview(numbers)
 
     def _overview(self, have: Sequence[int]) -> bytes:
@@ -136,8 +136,9 @@ class Replay(Closing):
         )
 
     def _moments(self, second: int) -> bytes:
-        """Return the moment that was current when a second began, and those in it; none before it was read whole. Of too
-        many, every second or third is returned, and so on.
+        """Return the moment that was current when a second began, and those in it; none before it was read whole.
+
+        Of too many, every second one is returned, or every third, and so on.
         """
         scanned, count = self._scanned.is_set(), len(self._times)
         first = max(bisect_right(self._times, 1_000_000 * second, hi=count) - 1, 0)

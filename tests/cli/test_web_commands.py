@@ -182,7 +182,7 @@ def test_a_recording_is_shown_from_any_moment_of_it_to_each_page(
             assert reply["topic"] in ("shell", "replay")
         assert reply["frames"][0]["number"] == 0
         ask(live, do="moments", numbers=["x"])
-        assert "for the moments of a recording, a page must send whole numbers" in told(live, "refused")["why"]
+        assert "for the moments of a recording, a page must send 1 of `numbers`" in told(live, "refused")["why"]
         ask(live, do="moments")
         assert told(live, "refused")["do"] == "moments"
         ask(live, do="delete")

@@ -143,7 +143,8 @@ _AREAS = """const [apart, done] = arguments;
       const switches = [0, 1, 2].map((bit) => ({ name: `s${bit}`, x_mm: apart * bit, y_mm: 0, bit }));
       const outline = [[-100, 0], [100, 0], [0, 100]];
       drawHand(svg, { ...hand, outline, switches, taxels: [], joints: [] }, { onSwitch: () => {} });
-      done([...svg.querySelectorAll(".area")].map((area) => area.getBoundingClientRect()).map(({ left, right }) => [left, right]));
+      const areas = [...svg.querySelectorAll(".area")].map((area) => area.getBoundingClientRect());
+      done(areas.map(({ left, right }) => [left, right]));
       svg.remove();
     });"""
 
@@ -368,7 +369,7 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             browser.script("location.hash = `t=${arguments[0]}`", seconds)
             texts = (grasp, said, other)
             browser.wait(lambda texts=texts: tuple(map(browser.text, ("grasp", "truth", "other"))) == texts)
-            browser.wait(lambda told=other.replace(": ", " announced "): told in browser.text("place").split(" · "))
+            browser.wait(lambda told=other: told.replace(": ", " announced ") in browser.text("place").split(" · "))
             wrong = said.startswith("✗")
             sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
             assert ("✗" in browser.script(sign)) == wrong

@@ -331,9 +331,7 @@ def test_of_many_connections_at_once_the_first_ones_stay(
         live.send('{"do":"wait"}')
         assert asked.wait(PATIENCE_S)
         # The server's thread waits, and finds all of them in one turn.
-        some = [
-            stack.enter_context(connection(client, b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")) for _ in range(8)
-        ]
+        some = [stack.enter_context(connection(client, b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")) for _ in range(8)]
         all_there.set()
         assert [ended(made) for made in some] == [False] * 3 + [True] * 5
         assert client.server.pages == 1
