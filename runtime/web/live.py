@@ -28,8 +28,8 @@ _MOST_CHANGES = 6_000
 _SILENT_US, _PERIODS = 500_000, 3
 # A clock that differs by more was set: to a later time, or back, where the past begins anew.
 _SET_US = 1_000_000
-# The glove is looked at so often; what is said of it is repeated once a second, and is not known when it was not.
-_LOOK_US, _LASTS_S = 200_000, 3
+# What is said of the glove is repeated once a second, and is not known when it was not.
+_LASTS_S = 3
 # What a timeline shows of a prediction: its time since 1970, the announced type, "degraded" or "unknown" health, and
 # the type and the beginning of the segment.
 Change = tuple[int, str, str, str, int | None]
@@ -66,8 +66,9 @@ class LivePage:
         # For pages opened later.
         self._past: Past = Past() if after is None else after._past
         self._past.silent_us = silent_us(glove.sources.switch_period_us, glove.sources.glove_period_us)
-        # The devices that are lost, and since when; and what was said of the glove.
-        self._lost, self._said, self._due_us = dict[str, str](), ("", ""), 0
+        # The devices that are lost, and since when; and when the newest data was read.
+        self._lost = dict[str, str]()
+        self._read_us: int | None = None
         manifest, silent = glove.system.build.manifest, self._past.silent_us
         about = build_message("build", folder, manifest, silent_us=silent, preshapes=glove.has_preshapes)
         server.publish("build", about)
@@ -75,7 +76,7 @@ class LivePage:
 
     def show(self, moment: Moment) -> None:
         """Show the moment that the glove has just published. For the thread of the run."""
-        grasp, glove = moment.grasp, self._glove
+        grasp = moment.grasp
         set_by_us = grasp.unix_us - grasp.time_us - self._clock_us
         if abs(set_by_us) > _SET_US:
             self._clock_us += set_by_us
@@ -84,33 +85,26 @@ class LivePage:
         self.server.publish("frame", partial(self._frames, moment, self._clock_us))
         self._past.take(change_of(grasp, self._clock_us))
         del self._past.changes[:-_MOST_CHANGES]
-        health, known = glove.health, self._health
+        ages_us = [age for age in (grasp.switch_age_us, grasp.glove_age_us) if age is not None]
+        if ages_us:
+            self._read_us = grasp.time_us - min(ages_us)
+        health, known = self._glove.health, self._health
         if health is not None and health is not known:
             gone = [device.name for device in health.devices if not device.connected]
             state = "not connected" if known is None else f"lost since {_clock(0)}"
             self._health, self._lost = health, {name: self._lost.get(name, state) for name in gone}
             self.server.publish("health", partial(message, "health", health))
-        if health is not known or grasp.time_us >= self._due_us:
-            said, self._due_us = self._state(grasp), grasp.time_us + _LOOK_US
-            if health is not known or said != self._said:
-                self._said = said
-                self.server.publish("glove", partial(self._glove_message, *said))
+            self.server.publish("glove", partial(self._glove_message))
 
-    def _state(self, grasp: LiveGrasp) -> tuple[str, str]:
-        """Return how the glove is, "good", "warn" or "bad", and in words."""
-        age_us = min((age for age in (grasp.switch_age_us, grasp.glove_age_us) if age is not None), default=None)
-        if self._lost:
-            return "bad", ", ".join(f"{name} {state}" for name, state in self._lost.items())
-        if age_us is None:
-            return "warn", "sends nothing yet"
-        if age_us > self._past.silent_us:
-            return "bad", self._said[1] if self._said[1].startswith("silent") else f"silent since {_clock(age_us)}"
-        return "good", "connected"
-
-    def _glove_message(self, level: str, words: str) -> bytes:
-        """Return the message on the glove's state, which is old if the run has stopped since."""
-        ago_us = self._clock_us + now_us() - self._past.until_us
-        if ago_us > 1_000_000 * _LASTS_S:
+    def _glove_message(self) -> bytes:
+        """Return the message on how the glove is now, "good", "warn" or "bad", and in words."""
+        level, words = "good", "connected"
+        ended = self._clock_us + now_us() - self._past.until_us > 1_000_000 * _LASTS_S
+        if self._lost and not ended:
+            level, words = "bad", ", ".join(f"{name} {state}" for name, state in self._lost.items())
+        elif self._read_us is None:
+            level, words = "warn", "sends nothing yet"
+        elif (ago_us := now_us() - self._read_us) > self._past.silent_us:
             level, words = "bad", f"silent since {_clock(ago_us)}"
         return message("glove", {"is": level}, words=words, lasts_s=_LASTS_S)
 
@@ -178,8 +172,8 @@ def shell_message(
 
 
 def build_message(topic: str, folder: Path, manifest: Manifest, *, silent_us: int | None, **shows: object) -> bytes:
-    """Return a message on the build in a folder: its name, types, switches and joints, whether it knows an empty hand,
-    the drawing of the hand, how long a moment of its run is current, or None for a recording, and what else the page
+    """Return a message on the build in a folder: its name, types and switches, whether it knows an empty hand, the
+    drawing of the hand, how long a moment of its run is current, or None for a recording, and what else the page
     `shows`. Raises BuildError if the drawing is damaged.
     """
     known = {
@@ -187,7 +181,6 @@ def build_message(topic: str, folder: Path, manifest: Manifest, *, silent_us: in
         "name": folder.resolve().name,
         "grasps": manifest.classes,
         "switches": [switch.name for switch in manifest.switches],
-        "joints": [joint.name for joint in manifest.joints],
         "empty_hand": manifest.knows_none,
         "hand": load_hand(folder, manifest),
     }

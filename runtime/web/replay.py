@@ -30,8 +30,8 @@ from .server import message
 # The interval of moments that are kept; the most changes of a build, or labels, that the overview holds.
 _SAMPLE_US, _MOST_CHANGES = 20_000, 200_000
 _PERIODS_OF = 20_000
-# Of one reply: entries of each list of the overview, moments, and bytes of these.
-MOST_ENTRIES, MOST_MOMENTS, MOST_BYTES = 4_000, 64, 262_144
+# Of one reply: entries of each list of the overview, and bytes of moments.
+MOST_ENTRIES, MOST_BYTES = 4_000, 1 << 20
 _LARGEST = 2**62
 # The number of a trial, its span, and its type; an empty span revokes the trial.
 Truth = tuple[int, int, int, str]
@@ -105,8 +105,7 @@ class Replay(Closing):
         ----------
         asked : mapping
             `do` is "overview", for the changes and labels that the page has not got yet, or "moments". `numbers` are,
-            of the overview, how many changes of each build, and labels, it has; of moments, the first time, the last,
-            and their interval, in microseconds since 1970.
+            of the overview, how many changes of each build, and labels, it has; of moments, the second since 1970.
 
         Raises
         ------
@@ -116,9 +115,9 @@ class Replay(Closing):
         do, numbers = asked.get("do"), asked.get("numbers")
         if do not in ("overview", "moments"):
             raise SettingError(f"a page can ask for the overview or for moments of a recording, not {str(do)[:20]!r}")
-        count = 3 if do == "moments" else len(self._builds) + 1
+        count = 1 if do == "moments" else len(self._builds) + 1
         if not isinstance(numbers, list | tuple) or len(numbers) != count or not all(map(_is_number, numbers)):
-            raise SettingError(f"for the {do} of a recording, a page must send {count} whole numbers below 2^62")
+            raise SettingError(f"for the {do} of a recording, a page must send {count} of `numbers`, below 2^62")
         return self._moments(*numbers) if do == "moments" else self._overview(numbers)
 
     def _overview(self, have: Sequence[int]) -> bytes:
@@ -136,24 +135,22 @@ class Replay(Closing):
             faults=self._faults[:8],
         )
 
-    def _moments(self, first_us: int, last_us: int, step_us: int) -> bytes:
-        """Return the moment that was current at `first_us`, and later ones; "to" says up to when these are all."""
-        times, texts, size = self._times, list[bytes](), 0
-        scanned, count = self._scanned.is_set(), len(times)
-        if not scanned:
-            last_us = min(last_us, times[count - 1] if count else first_us - 1)
-        to_us, number = last_us, max(bisect_right(times, first_us, hi=count) - 1, 0)
-        # The moment at a time that was not read yet is not known.
-        while number < count and (scanned or first_us <= last_us) and (not texts or times[number] <= last_us):
-            if len(texts) == MOST_MOMENTS or size > MOST_BYTES:
-                to_us = times[number] - 1
-                break
-            begin, end = self._ends[number : number + 2]
-            texts.append(os.pread(self._kept.fileno(), end - begin, begin))
-            size += end - begin
-            number = max(bisect_left(times, times[number] + step_us, hi=count), number + 1)
-        head = message("moments", from_us=first_us, to_us=to_us)
-        return head[:-1] + b',"frames":[' + b",".join(texts) + b"]}"
+    def _moments(self, second: int) -> bytes:
+        """Return the moment that was current when a second began, and those in it; none before it was read whole.
+
+        Of too many, every second one is returned, or every third, and so on.
+        """
+        scanned, count = self._scanned.is_set(), len(self._times)
+        first = max(bisect_right(self._times, 1_000_000 * second, hi=count) - 1, 0)
+        end = bisect_left(self._times, 1_000_000 * (second + 1), first, count)
+        texts = list[bytes]()
+        if count and (scanned or end < count):
+            end = max(end, first + 1)
+            step = 1 + (self._ends[end] - self._ends[first]) // MOST_BYTES
+            for number in range(first, end, step):
+                begin, behind = self._ends[number : number + 2]
+                texts.append(os.pread(self._kept.fileno(), behind - begin, begin))
+        return message("moments", second=second)[:-1] + b',"frames":[' + b",".join(texts) + b"]}"
 
     def _scan(self) -> None:
         """Recognise the whole recording: fill the overview, and keep what pages show."""

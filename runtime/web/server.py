@@ -12,6 +12,7 @@ import secrets
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from threading import Event, Thread
 from urllib.parse import quote
@@ -28,12 +29,13 @@ from .guard import HEADERS, Guard
 Message = bytes | Callable[[], bytes]
 
 _log = logging.getLogger("thenar")
-# Neither of them writes a stranger's input into our log.
+# It would write a stranger's input into our log.
 _quiet = logging.getLogger("thenar.web")
 _quiet.setLevel(logging.CRITICAL)
 
 PAGES = Path(__file__).parent / "pages"
-_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+_KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+_TYPES = {suffix: f"{kind}; charset=utf-8" for suffix, kind in _KINDS.items()}
 
 PERIOD_S = 1 / 30
 # Pages open at the same time, and connections, some of which fetch files.
@@ -114,7 +116,6 @@ class Server(Closing):
         self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/" + (f"?token={token}" if token else "")
         self._on_message = on_message
         self._latest: dict[str, Message] = {}
-        self._offered: dict[str, tuple[str, bytes]] = {}
         self._pages: list[_Page] = []
         self._started = Event()
         self.thread = Thread(target=self._run, name="thenar web", daemon=True)
@@ -135,9 +136,10 @@ class Server(Closing):
         The address is random, and browsers save what is there: they do not show it as a page of this server.
         """
         address = f"/offered/{secrets.token_urlsafe(12)}"
-        self._offered[address] = (name, content)
-        for old in list(self._offered)[:-_MOST_OFFERED]:
-            del self._offered[old]
+        saved = f"attachment; filename*=UTF-8''{quote(name, safe='', errors='replace')}"
+        self._files[address] = content, {"Content-Type": "application/octet-stream", "Content-Disposition": saved}
+        for old in [path for path in list(self._files) if path.startswith("/offered/")][:-_MOST_OFFERED]:
+            del self._files[old]
         return address
 
     @property
@@ -148,7 +150,7 @@ class Server(Closing):
     def close(self) -> None:
         """End the server; may be called again."""
         if self.thread.is_alive():
-            self._loop.call_soon_threadsafe(self._closing.set)
+            self._loop.call_soon_threadsafe(self._ticking.cancel)
             self.thread.join()
 
     def _run(self) -> None:
@@ -160,49 +162,43 @@ class Server(Closing):
             self._started.set()
 
     async def _serve(self) -> None:
-        self._loop, self._closing, self._somebody = asyncio.get_running_loop(), asyncio.Event(), asyncio.Event()
+        self._loop, self._somebody = asyncio.get_running_loop(), asyncio.Event()
         self._server = web.Server(
             self._respond, access_log=None, logger=_quiet, keepalive_timeout=_FETCH_S, lingering_time=0
         )
-        with self._listener:
-            try:
-                async with asyncio.TaskGroup() as group:
-                    working = [group.create_task(self._accept_clients()), group.create_task(self._tick())]
-                    self._started.set()
-                    await self._closing.wait()
-                    for task in working:
-                        task.cancel()
-            finally:
-                # The last message that a page shows is how it ended.
-                for page in tuple(self._pages):
-                    await page.show(self._latest.copy())
-                await asyncio.gather(*(page.close(WSCloseCode.GOING_AWAY) for page in self._pages))
-                await self._server.shutdown(_CLOSING_S)
+        # Every connection has the buffer of the listener.
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+        listening = await self._loop.create_server(self._connection, sock=self._listener)
+        self._ticking = asyncio.create_task(self._tick())
+        self._started.set()
+        try:
+            with suppress(asyncio.CancelledError):
+                await self._ticking
+        finally:
+            listening.close()
+            # The last message that a page shows is how it ended.
+            for page in tuple(self._pages):
+                await page.show(self._latest.copy(), _text)
+            await asyncio.gather(*(page.close(WSCloseCode.GOING_AWAY) for page in self._pages))
+            await self._server.shutdown(_CLOSING_S)
 
-    async def _accept_clients(self) -> None:
-        self._listener.setblocking(False)
-        while True:
-            try:
-                reader, _ = await self._loop.sock_accept(self._listener)
-            except OSError:  # gone before it was accepted, or no descriptors left
-                await asyncio.sleep(PERIOD_S)
-                continue
-            if len(self._server.connections) >= MOST_CONNECTIONS:
-                reader.close()
-                continue
-            with suppress(OSError):
-                reader.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
-                reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                transport, _ = await self._loop.connect_accepted_socket(self._server, reader)
-                self._loop.call_later(_FETCH_S, self._end_unless_page, transport)
+    def _connection(self) -> asyncio.Protocol:
+        """Return the protocol of a new connection."""
+        handler = self._server()
 
-    def _end_unless_page(self, transport: asyncio.Transport) -> None:
-        if all(page.transport is not transport for page in self._pages):
-            transport.abort()
+        def end_unless(may_stay: Callable[[], bool]) -> None:
+            if handler.transport is not None and not may_stay():
+                handler.transport.abort()
+
+        # As soon as it has a transport, if it came after as many as there may be; and once it had time to fetch a file.
+        self._loop.call_later(0, end_unless, lambda: handler in self._server.connections[:MOST_CONNECTIONS])
+        self._loop.call_later(
+            _FETCH_S, end_unless, lambda: any(page.transport is handler.transport for page in self._pages)
+        )
+        return handler
 
     async def _tick(self) -> None:
         """Send new messages to every page, while any is open."""
-        sent: dict[str, Message] = {}
         due_s = self._loop.time()
         while True:
             if not self._pages:
@@ -211,11 +207,11 @@ class Server(Closing):
             now_s = self._loop.time()
             due_s = max(due_s + PERIOD_S, now_s)
             await asyncio.sleep(due_s - now_s)
-            latest = self._latest.copy()
-            new = {topic: _text(made) for topic, made in latest.items() if made is not sent.get(topic)}
-            sent = latest
+            # Made once for all of them. One that hangs does not reply to a ping.
+            latest, text = self._latest.copy(), cache(_text)
             for page in tuple(self._pages):
-                await page.send(new)
+                if page.transport.get_write_buffer_size() == 0:
+                    await page.show(latest, text)
 
     async def _respond(self, request: web.BaseRequest) -> web.StreamResponse:
         guard = self._guard
@@ -229,15 +225,9 @@ class Server(Closing):
             return _said(403, "Open the full address that thenar printed, including its token.")
         if request.path == "/live":
             return await self._live(request)
-        if offered := self._offered.get(request.path):
-            saved = {
-                "Content-Disposition": f"attachment; filename*=UTF-8''{quote(offered[0], safe='', errors='replace')}"
-            }
-            return web.Response(body=offered[1], content_type="application/octet-stream", headers=HEADERS | saved)
-        file = self._files.get(request.path)
-        if file is None:
+        if (file := self._files.get(request.path)) is None:
             return _said(404, "There is no such page.")
-        return web.Response(body=file[0], content_type=file[1], charset="utf-8", headers=HEADERS)
+        return web.Response(body=file[0], headers=HEADERS | file[1])
 
     async def _live(self, request: web.BaseRequest) -> web.StreamResponse:
         if not self._guard.same_origin(request.headers.get("Origin"), request.headers.get("Host", "")):
@@ -257,7 +247,7 @@ class Server(Closing):
         await live.prepare(request)
         topics = request.query.get("topics")
         page = _Page(live, transport, self._loop.time(), frozenset(topics.split(",")) if topics else None)
-        await page.show(self._latest.copy())
+        await page.show(self._latest.copy(), _text)
         self._pages.append(page)
         self._somebody.set()
         try:
@@ -301,9 +291,7 @@ class Server(Closing):
 
 
 class _Page:
-    """A page that is open in a browser: its WebSocket, the topics that it shows, or all, and the messages waiting for
-    it.
-    """
+    """A page that is open in a browser: its WebSocket, the topics that it shows, or all, and what it was sent last."""
 
     def __init__(
         self, live: web.WebSocketResponse, transport: asyncio.Transport, now_s: float, topics: frozenset[str] | None
@@ -311,23 +299,15 @@ class _Page:
         self.socket, self.transport, self._topics = live, transport, topics
         # Nothing is sent until the system has taken everything before it: writing never has to wait.
         transport.set_write_buffer_limits(high=2**30)
-        self._waiting: dict[str, bytes] = {}
+        self._sent: dict[str, Message] = {}
         self._may, self._spoke_s = MOST_AT_ONCE, now_s
 
-    async def show(self, latest: Mapping[str, Message]) -> None:
-        """Send the newest message of each topic."""
+    async def show(self, latest: Mapping[str, Message], text: Callable[[Message], bytes]) -> None:
+        """Send the newest message of each topic, if the page has not got it yet; `text` makes it."""
         for topic, made in latest.items():
-            if self._topics is None or topic in self._topics:
-                await self.say(_text(made))
-
-    async def send(self, new: Mapping[str, bytes]) -> None:
-        """Send the newest of each topic, unless the page is behind; one that hangs does not reply to a ping."""
-        self._waiting |= {topic: text for topic, text in new.items() if self._topics is None or topic in self._topics}
-        if self.transport.get_write_buffer_size():
-            return
-        waiting, self._waiting = self._waiting, {}
-        for text in waiting.values():
-            await self.say(text)
+            if (self._topics is None or topic in self._topics) and made is not self._sent.get(topic):
+                self._sent[topic] = made
+                await self.say(text(made))
 
     async def say(self, text: bytes) -> None:
         """Send one message; to a page that is gone, send nothing."""
@@ -347,10 +327,10 @@ class _Page:
             await self.socket.close(code=code)
 
 
-def _files(page: str, folder: Path) -> dict[str, tuple[bytes, str]]:
-    """Return content and type of each file, by its request path: nothing else can be read."""
-    paths = {path.name: path for place in (PAGES, folder) for path in place.iterdir() if path.is_file()}
-    found = {f"/{name}": (path.read_bytes(), _TYPES[path.suffix]) for name, path in paths.items()}
+def _files(page: str, folder: Path) -> dict[str, tuple[bytes, dict[str, str]]]:
+    """Return content and headers of each file, by its request path: nothing else can be read."""
+    paths = [path for place in (PAGES, folder) for path in place.iterdir() if path.is_file()]
+    found = {f"/{path.name}": (path.read_bytes(), {"Content-Type": _TYPES[path.suffix]}) for path in paths}
     return {"/": found[f"/{page}.html"], **found}
 
 

@@ -168,18 +168,21 @@ def test_a_recording_is_shown_from_any_moment_of_it_to_each_page(
         assert (overview["truth"], overview["faults"]) == ([], [])
         assert overview["changes"][0][0][1] == "unknown"
         first, last = overview["first_us"], overview["last_us"]
-        ask(live, do="moments", numbers=[first, last, 1])
-        frames = told(live, "moments")["frames"]
+        frames = list[dict[str, Any]]()
+        for second in range(first // 10**6, last // 10**6 + 1):
+            ask(live, do="moments", numbers=[second])
+            # The first moment of a second may be the last one of the second before.
+            frames += [frame for frame in told(live, "moments")["frames"] if frame not in frames]
         assert (frames[0]["number"], frames[-1]["number"], frames[-1]["change"][0]) == (0, 19, last)
         assert len(frames) <= 20
         # The other page has asked for nothing.
         assert [json.loads(other.recv(timeout=PATIENCE_S))["topic"] for _ in range(2)] == ["shell", "replay"]
-        ask(other, do="moments", numbers=[first, first, 1])
+        ask(other, do="moments", numbers=[first // 10**6])
         while (reply := json.loads(other.recv(timeout=PATIENCE_S)))["topic"] != "moments":
             assert reply["topic"] in ("shell", "replay")
-        assert [frame["number"] for frame in reply["frames"]] == [0]
-        ask(live, do="moments", numbers=[first, "x", 1])
-        assert "for the moments of a recording, a page must send 3 whole numbers" in told(live, "refused")["why"]
+        assert reply["frames"][0]["number"] == 0
+        ask(live, do="moments", numbers=["x"])
+        assert "for the moments of a recording, a page must send 1 of `numbers`" in told(live, "refused")["why"]
         ask(live, do="moments")
         assert told(live, "refused")["do"] == "moments"
         ask(live, do="delete")

@@ -263,12 +263,12 @@ def test_a_page_names_members_by_id_alone_and_its_requests_are_bounded(studio: S
         assert reply(do="replay", ids=[recording])["builds"] == ["few"]
         assert reply(do="replay", ids=[recording, few, more])["builds"] == ["few", "more"]
         asked = {"do": "moments", "ids": [recording, few]}
-        for numbers in ([0, 1], [0, 1, 2**62], [1, 2, 3, 4]):
-            assert "a page must send 3 whole numbers" in reply(**asked, numbers=numbers)["why"]
-        for wrong in ("x", [0.5, 1, 1], [None, 1, 1], {"from": 1}):
+        for numbers in ([], [2**62], [0, 1], [1, 2, 3, 4]):
+            assert "a page must send 1 of `numbers`" in reply(**asked, numbers=numbers)["why"]
+        for wrong in ("x", [0.5], [None], {"from": 1}):
             assert reply(**asked, numbers=wrong)["why"].startswith("the page sent an invalid message")
         assert reply(do="use-build", id="../few")["why"].startswith("the project has no build ")
-        assert reply(do="moments", ids=[recording, few], numbers=[0, 2**62 - 1, -1])["topic"] == "moments"
+        assert reply(do="moments", ids=[recording, few], numbers=[2**62 - 1])["topic"] == "moments"
     with page(opened.server.url) as live:
         # However many recordings pages ask for, a few stay open.
         for name in range(6):

@@ -159,7 +159,7 @@ function spacing(places) {
 
 /* ---- The posed hand: a right hand, seen from the side of its thumb; x to the thumb, y to the tips, z off the palm ---- */
 
-const VIEW = (38 * Math.PI) / 180;
+const VIEW = new DOMMatrix().rotateAxisAngle(0, 1, 0, -38);
 const DIGITS = {
   little: { base: [-31, 78, 0], lean: -13, next: ["ring", -1], lengths: [36, 21, 18], width: 13 },
   ring: { base: [-13, 87, 0], lean: -6, next: ["middle", -1], lengths: [44, 28, 20], width: 14.5 },
@@ -169,13 +169,6 @@ const DIGITS = {
 };
 const PALM = [[-21, -4, 0], [-34, 40, 0], "little", "ring", "middle", "index", [30, 45, 2], [21, -4, 0]];
 const SPAN = { abduction: 30, arch: 30, yaw: 40 }; // degrees for joints not measured as angles; for others 90
-
-const add = (a, b, by = 1) => a.map((value, at) => value + by * b[at]);
-const dot = (a, b) => a.reduce((sum, value, at) => sum + value * b[at], 0);
-const radians = (degrees) => (degrees * Math.PI) / 180;
-const turned = (ahead, flex, degrees) =>
-  add(ahead.map((value) => value * Math.cos(radians(degrees))), flex, Math.sin(radians(degrees)));
-const project = ([x, y, z]) => [x * Math.cos(VIEW) - z * Math.sin(VIEW), y];
 
 // A joint's value in degrees: an angle as it is, other units from straight at the lowest to bent at the highest.
 function degrees(joint, value) {
@@ -188,45 +181,37 @@ function degrees(joint, value) {
 // From joint values, by digit and movement, to points of every digit, of the palm and of the forearm.
 function posed(angles) {
   const at = (digit, moves, otherwise = 0) => angles[digit]?.[moves] ?? otherwise;
-  const wrist = (point) => {
-    const [pitch, yaw] = [radians(at("wrist", "pitch")), radians(-at("wrist", "yaw"))];
-    const [x, y, z] = point;
-    const [u, v] = [x * Math.cos(yaw) - y * Math.sin(yaw), x * Math.sin(yaw) + y * Math.cos(yaw)];
-    return [u, v * Math.cos(pitch) - z * Math.sin(pitch), v * Math.sin(pitch) + z * Math.cos(pitch)];
-  };
-  const arch = Math.sin(radians(at("palm", "arch"))), leans = { middle: at("middle", "abduction") }, chains = {};
-  const bases = { ring: [0, 0, 18 * arch], little: [4 * Math.abs(arch), 0, 34 * arch] };
+  const wrist = VIEW.rotateAxisAngle(1, 0, 0, at("wrist", "pitch")).rotateAxisAngle(0, 0, 1, -at("wrist", "yaw"));
+  const arch = Math.sin((at("palm", "arch") * Math.PI) / 180), leans = { middle: at("middle", "abduction") }, chains = {};
+  const arched = { ring: [0, 0, 18 * arch], little: [4 * Math.abs(arch), 0, 34 * arch] };
   for (const digit of ["middle", "index", "ring", "little"]) {
     const { base, lean, lengths, next } = DIGITS[digit];
     if (next) {
       const [neighbour, side] = next, spread = at(digit, "abduction", side * (lean - DIGITS[neighbour].lean));
       leans[digit] = leans[neighbour] + side * spread;
     }
-    const angle = radians(leans[digit]), ahead = [Math.sin(angle), Math.cos(angle), 0], curl = at(digit, "curl");
-    const pip = at(digit, "pip", curl), bends = [at(digit, "mcp", curl * 0.8), pip, at(digit, "dip", pip * 0.66)];
-    chains[digit] = chain(add(base, bases[digit] ?? [0, 0, 0]), ahead, [0, 0, 1], lengths, bends);
+    const curl = at(digit, "curl"), pip = at(digit, "pip", curl);
+    const place = wrist.translate(...base).translate(...(arched[digit] ?? []));
+    const bends = [at(digit, "mcp", curl * 0.8), pip, at(digit, "dip", pip * 0.66)];
+    chains[digit] = chain(place.rotateAxisAngle(0, 0, 1, -leans[digit]), lengths, bends);
   }
-  const { base, lean, lengths } = DIGITS.thumb, curl = at("thumb", "curl");
-  const side = radians(at("thumb", "abduction", lean)), round = radians(at("thumb", "rotation", 20));
-  const ahead = [Math.sin(side) * Math.cos(round), Math.cos(side), Math.sin(side) * Math.sin(round)];
-  const over = [-1, 0.1, 0.35], flat = add(over, ahead, -dot(over, ahead)), size = Math.sqrt(dot(flat, flat)) || 1;
+  const { base, lean, lengths } = DIGITS.thumb, curl = at("thumb", "curl"), round = at("thumb", "rotation", 20);
+  const ahead = wrist.translate(...base).rotateAxisAngle(0, 1, 0, -round).rotateAxisAngle(0, 0, 1, -at("thumb", "abduction", lean));
+  // It bends across the palm: the less it is opposed, the more it is turned to it.
   const bends = [0, at("thumb", "mcp", curl * 0.6), at("thumb", "ip", curl)];
-  chains.thumb = chain(base, ahead, flat.map((value) => value / size), lengths, bends);
-  const turn = (points) => points.map((point) => project(wrist(point)));
-  const palm = PALM.map((point) => (typeof point === "string" ? chains[point][0] : point));
-  return {
-    chains: Object.fromEntries(Object.entries(chains).map(([digit, points]) => [digit, turn(points)])),
-    palm: turn(palm),
-    forearm: [[-18, 4, 0], [-17, -34, 0], [17, -34, 0], [18, 4, 0]].map(project),
-  };
+  chains.thumb = chain(ahead.rotateAxisAngle(0, 1, 0, (round - 72) * 0.9), lengths, bends);
+  const palm = PALM.map((point) => (typeof point === "string" ? chains[point][0] : seenAt(wrist.translate(...point))));
+  return { chains, palm, forearm: [[-18, 4], [-17, -34], [17, -34], [18, 4]].map((point) => seenAt(VIEW.translate(...point))) };
 }
 
-function chain(base, ahead, flex, lengths, bends) {
-  const points = [base];
-  let bent = 0;
+// Where the origin of a coordinate system is seen.
+const seenAt = ({ e, f }) => [e, f];
+
+function chain(bone, lengths, bends) {
+  const points = [seenAt(bone)];
   lengths.forEach((length, at) => {
-    bent += bends[at];
-    points.push(add(points.at(-1), turned(ahead, flex, bent), length));
+    bone = bone.rotateAxisAngle(1, 0, 0, bends[at]).translate(0, length);
+    points.push(seenAt(bone));
   });
   return points;
 }
@@ -266,38 +251,24 @@ function posedHand(joints) {
   return { group, set, box: { left: -72, top: -202, width: 152, height: 246 } };
 }
 
-/* ---- Joints of which nobody knows where they are: needles, from level to upright ---- */
+/* ---- Joints of which nobody knows where they are: squares as of taxels, in a grid ---- */
 
-function dials(joints) {
-  const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length)))), size = 46;
-  const needles = joints.map(({ name }, at) => {
-    const needle = draw("path", { class: "needle", d: "M0 0H26" });
-    const handle = draw("path", { class: "handle", d: "M-2.6 0a2.6 2.6 0 1 0 5.2 0a2.6 2.6 0 1 0 -5.2 0" });
-    const group = draw(
-      "g",
-      { transform: `translate(${size * (at % columns) + 9} ${size * Math.floor(at / columns) + 34})` },
-      draw("path", { class: "dial", d: "M0 0H26A26 26 0 0 0 0 -26Z" }),
-      needle,
-      handle,
-      draw("text", { x: 13, y: 9, class: "middle" }, shortened(name, 12)),
-      draw("title", {}, name),
-    );
-    return { group, needle, handle };
+function unplaced(joints) {
+  const columns = Math.max(1, Math.min(4, Math.ceil(Math.sqrt(joints.length))));
+  const taxels = joints.map(({ name }, at) => {
+    return { name, x_mm: 50 * (at % columns), y_mm: -22 * Math.floor(at / columns), levels: [[0, at]] };
   });
-  const set = (values) => {
-    joints.forEach((joint, at) => {
-      const value = values[joint.joint] ?? null, span = joint.high - joint.low;
-      const share = value === null || !(span > 0) ? 0 : Math.min(Math.max((value - joint.low) / span, 0), 1);
-      const angle = (share * Math.PI) / 2, end = `${(26 * Math.cos(angle)).toFixed(1)} ${(-26 * Math.sin(angle)).toFixed(1)}`;
-      const { group, needle, handle } = needles[at];
-      needle.setAttribute("d", `M0 0L${end}`);
-      handle.setAttribute("transform", `translate(${end})`);
-      group.classList.toggle("gone", value === null);
-    });
+  const grid = new Glove({ placed: false, radius_mm: 3, outline: [], strips: [], creases: [], labels: [], switches: [], taxels });
+  grid.set = (values) => {
+    const own = joints.map(({ joint }) => values[joint] ?? null);
+    grid.setTaxels(own.map((value, at) => {
+      const { low, high } = joints[at];
+      return value === null ? 0 : (value - low) / (high - low || 1);
+    }));
+    grid.setClosed([], own.map((value) => value === null));
   };
-  set([]);
-  const box = { left: 0, top: 0, width: size * columns, height: size * Math.ceil(joints.length / columns) };
-  return { group: draw("g", {}, ...needles.map((one) => one.group)), set, box };
+  grid.set([]);
+  return grid;
 }
 
 /* ---- All of it ---- */
@@ -316,9 +287,9 @@ function dials(joints) {
  * setPose(values)        the value of each of hand.joints, in its unit; null: lost
  */
 export function drawHand(svg, hand, { onSwitch = null } = {}) {
-  const glove = new Glove(hand, onSwitch), placed = hand.joints.filter((joint) => joint.digit);
-  const others = hand.joints.filter((joint) => !joint.digit);
-  const joints = [...(placed.length ? [posedHand(placed)] : []), ...(others.length ? [dials(others)] : [])];
+  const glove = new Glove(hand, onSwitch);
+  const kinds = [[posedHand, hand.joints.filter(({ digit }) => digit)], [unplaced, hand.joints.filter(({ digit }) => !digit)]];
+  const joints = kinds.filter(([, some]) => some.length).map(([drawn, some]) => drawn(some));
   const parts = [...(glove.box ? [glove] : []), ...joints];
   svg.replaceChildren(glove.group, ...joints.map(({ group }) => group));
   svg.classList.add("hand");

@@ -1,6 +1,8 @@
 // The frame of every page: the bar on top, the links to the other pages, the connection to the server, its work, and
 // what it refuses.
-import { $, button, clock, connect, make, say, tell } from "./wire.js";
+import { $, button, clock, make, say, tell } from "./wire.js";
+
+const FIRST_MS = 250, LONGEST_MS = 5000; // before it connects again
 
 /** What the server does, in words. */
 export const WORK = {
@@ -9,22 +11,24 @@ export const WORK = {
 };
 
 /**
- * Make the page's bar, and connect to its server.
- * @param {Object<string, function(object): void>} handlers as for `connect`; a page gets the topics that it handles
- * @returns {function(string, object=): boolean} ask(what, more): send a request; what is refused is said in #refused
+ * Make the page's bar, and connect to its server, again and again.
+ * @param {Object<string, function(object): void>} handlers by topic: a page gets those that it handles; "open" and
+ * "closed" are events of the connection itself
+ * @returns {function(string, object=): boolean} ask(what, more): send a request, unless there is no connection; what is
+ * refused is said in #refused
  */
 export function openPage(handlers) {
-  let lasts; // until what is said of the glove is too old
+  let socket, wait = FIRST_MS, lasts; // until what is said of the glove is too old
   const badges = ["wearer", "glove-state", "build-state", "link"].map((id) => make("span", { id, class: "badge", hidden: true }));
   const title = make("h1", {}, make("span", { class: "brand" }, "thenar"), " ", make("span", { id: "name" }));
   const pages = make("nav", { id: "pages", "aria-label": "Pages" });
   document.head.append(make("link", { rel: "icon", href: "icon.svg" }));
-  const cancel = button("Cancel", () => send({ do: "cancel" }), { id: "cancel", class: "plain", hidden: true });
+  const cancel = button("Cancel", () => ask("cancel"), { id: "cancel", class: "plain", hidden: true });
   const busy = make("p", { class: "row" }, make("span", { id: "work" }), cancel);
   const refused = make("p", { id: "refused", role: "alert" });
   document.body.prepend(make("header", {}, title, make("p", { class: "row" }, ...badges), pages, busy), refused);
   badge("link", "bad", "page: connecting");
-  const send = connect({
+  const own = {
     work,
     shell: show,
     open: () => badge("link", "good", `page: connected since ${clock(performance.now())}`),
@@ -40,12 +44,30 @@ export function openPage(handlers) {
       badge("glove-state", is, words && `glove: ${words}`);
     },
     refused: ({ why }) => say(refused, why),
-  }, handlers);
-  return (what, more = {}) => {
-    const sent = send({ do: what, ...more });
-    say(refused, sent ? "" : "not connected");
-    return sent;
   };
+  const take = (message) => [own, handlers].forEach((some) => some[message.topic]?.(message));
+  const topics = new Set([own, handlers].flatMap(Object.keys));
+  function open() {
+    socket = new WebSocket(new URL(`/live?topics=${[...topics]}`, location.href.replace("http", "ws")));
+    socket.addEventListener("open", () => {
+      wait = FIRST_MS;
+      take({ topic: "open" });
+    });
+    socket.addEventListener("message", (event) => take(JSON.parse(event.data)));
+    socket.addEventListener("close", () => {
+      take({ topic: "closed" });
+      setTimeout(open, wait);
+      wait = Math.min(2 * wait, LONGEST_MS);
+    });
+  }
+  function ask(what, more = {}) {
+    const up = socket.readyState === WebSocket.OPEN;
+    say(refused, up ? "" : "not connected");
+    if (up) socket.send(JSON.stringify({ do: what, ...more }));
+    return up;
+  }
+  open();
+  return ask;
 }
 
 function badge(id, level, words) {

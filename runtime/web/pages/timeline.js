@@ -97,8 +97,7 @@ export class Timeline {
   #wide = 0;
   #whole = false; // while a recording is read, the window has all of it, until somebody zooms
   #styles = typeStyles([]);
-  #colours = null; // of the page, as long as they and the canvas are the same
-  #pen = null;
+  #colours = null;
   #pointers = new Map();
   #moved = 0;
   #stale = true; // the lanes, and not just the cursor
@@ -119,11 +118,7 @@ export class Timeline {
     for (const kind of ["down", "move", "up", "cancel"]) {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
-    redraw(canvas, () => {
-      [this.#pen, this.#wide, this.#colours] = [clearedPen(canvas), canvas.clientWidth, colours()];
-      this.#stale = true;
-      this.#draw(); // at once: it is cleared
-    });
+    redraw(canvas, () => this.draw());
     const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
     for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
     addEventListener("keydown", (event) => this.#key(event));
@@ -226,11 +221,11 @@ export class Timeline {
   }
 
   #drawLanes() {
-    const lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, pen = this.#pen, wide = this.#wide;
+    const lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, wide = this.canvas.clientWidth;
     if (this.canvas.style.height !== `${high}px`) this.canvas.style.height = `${high}px`;
     if (!wide) return;
-    const x = (us) => ((us - this.#from) / this.#span) * wide;
-    pen.clearRect(0, 0, wide, high);
+    [this.#wide, this.#colours] = [wide, colours()];
+    const pen = clearedPen(this.canvas), x = (us) => ((us - this.#from) / this.#span) * wide;
     pen.font = `${LETTERS}px system-ui, sans-serif`;
     pen.textBaseline = "middle";
     lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));

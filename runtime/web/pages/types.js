@@ -1,11 +1,13 @@
 // A colour and a short code for each type, the same on all pages.
 import { make } from "./wire.js";
 
-// Okabe and Ito's colours, which colour-blind people can distinguish, and darker and paler ones for further types.
+// Okabe and Ito's colours, which colour-blind people can distinguish, and darker and paler ones for further types. The
+// ink on the first ones is black, on the others white.
 const COLOURS = [
-  "#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#8a8a8a",
-  "#003f66", "#8f6300", "#00543d", "#7a3d60", "#b5dcf5", "#7a2d00", "#a3c585", "#4b4f9e",
+  "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#8a8a8a", "#b5dcf5", "#a3c585",
+  "#0072b2", "#003f66", "#8f6300", "#00543d", "#7a3d60", "#7a2d00", "#4b4f9e",
 ];
+const PALE = 9;
 const NO_TYPES = { none: "–", unknown: "?" };
 
 /**
@@ -23,10 +25,11 @@ export function typeStyles(names) {
     const code = candidates(name).find((one) => !codes.has(one.toLowerCase()));
     codes.add(code.toLowerCase());
     if (colours.size === COLOURS.length) colours.clear();
-    let at = hash(name) % COLOURS.length;
+    // Another type changes few of them.
+    let at = [...name].reduce((sum, letter) => (31 * sum + letter.codePointAt(0)) % 65_521, 7) % COLOURS.length;
     while (colours.has(at)) at = (at + 1) % COLOURS.length;
     colours.add(at);
-    styles.set(name, { code, colour: COLOURS[at], ink: inkOn(COLOURS[at]) });
+    styles.set(name, { code, colour: COLOURS[at], ink: at < PALE ? "#000000" : "#ffffff" });
   }
   return styles;
 }
@@ -57,19 +60,4 @@ function candidates(name) {
     ...rest.slice(1).map((letter) => first.toUpperCase() + rest[0] + letter),
     ...numbers,
   ];
-}
-
-function hash(name) {
-  let found = 7;
-  for (const letter of name) found = (Math.imul(found, 31) + letter.codePointAt(0)) >>> 0;
-  return found;
-}
-
-// Black or white: one of them always has a contrast of 4.5 or more.
-function inkOn(colour) {
-  const [red, green, blue] = [1, 3, 5].map((at) => {
-    const share = parseInt(colour.slice(at, at + 2), 16) / 255;
-    return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
-  });
-  return 0.2126 * red + 0.7152 * green + 0.0722 * blue > 0.179 ? "#000000" : "#ffffff";
 }

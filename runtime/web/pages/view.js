@@ -23,6 +23,9 @@ export class View {
   #readAt = null; // when the newest data was read
   #silent = Infinity; // how long a moment is current, in milliseconds: moments of a recording have no age
   #old = false;
+  #next = ""; // the last words for screen readers, and when they were said
+  #spokenAt = -Infinity;
+  #timer = null;
   #draw = paced(() => this.frame && this.#show());
   #say = paced(() => this.frame && this.#words(), WORDS_MS);
 
@@ -30,23 +33,21 @@ export class View {
     this.frame = null;
     this.rows = new Map();
     this.quarantined = [];
-    this.said = { text: "", at: 0, since: 0, candidate: "" };
     setInterval(() => this.#look(), LOOK_MS);
   }
 
-  /** Take the grasp types, switches, joints and hand of the build, and how long a moment of its run is current. */
+  /** Take the grasp types, switches and hand of the build, and how long a moment of its run is current. */
   begin(build) {
     this.frame = null; // what comes next is drawn, even if it is the same
     this.#silent = (build.silent_us ?? Infinity) / 1000;
     this.switches = build.switches;
-    this.joints = build.joints;
-    this.taxels = build.hand.taxels;
+    this.hand = build.hand;
     this.drawing = drawHand($("hand"), build.hand);
     const styles = typeStyles(build.grasps);
     this.rows = new Map(build.grasps.map((grasp) => {
-      const full = make("span"), share = make("span", { class: "share" }), bar = make("div", { class: "bar" }, full);
+      const bar = make("progress", { "aria-hidden": "true", value: 0 }), share = make("span", { class: "share" });
       const row = make("li", {}, chip(styles.get(grasp)), make("span", { class: "name" }, grasp), bar, share);
-      return [grasp, { row, full, share }];
+      return [grasp, { row, bar, share }];
     }));
     $("types").replaceChildren(...[...this.rows.values()].map(({ row }) => row));
     $("preshape").hidden = !build.preshapes;
@@ -87,8 +88,7 @@ export class View {
   /** Tell news, also to screen readers. */
   tell(words) {
     say($("news"), words);
-    Object.assign(this.said, { text: words, at: performance.now() });
-    say($("spoken"), words);
+    this.#announce(words, 0);
   }
 
   #look() {
@@ -100,7 +100,7 @@ export class View {
     document.documentElement.classList.toggle("old", old);
     this.#title();
     this.#draw();
-    if (old) this.#announce("no data", performance.now(), true);
+    if (old) this.#announce("no data", 0);
   }
 
   #title() {
@@ -121,9 +121,9 @@ export class View {
     tell("health", health);
     say($("why"), means);
     this.drawing.setClosed(closed, gone);
-    this.drawing.setPose((frame.joints ?? []).map((value, at) => (frame.lost.includes(this.joints[at]) ? null : value)));
-    this.drawing.setTaxels(this.taxels.map(({ name }) => frame.taxels[name] ?? null));
-    this.#announce(this.#old ? "no data" : frame.grasp, performance.now());
+    this.drawing.setPose((frame.joints ?? []).map((value, at) => (frame.lost.includes(this.hand.joints[at].name) ? null : value)));
+    this.drawing.setTaxels(this.hand.taxels.map(({ name }) => frame.taxels[name] ?? null));
+    if (!this.#old) this.#announce(frame.grasp);
   }
 
   // Which switches are lost, and which of the others are closed.
@@ -142,9 +142,9 @@ export class View {
       const said = `${names.length} of ${counted}`;
       say($("hand-says"), `${said}${names.length ? ": " : ""}${names.slice(0, SHOWN).join(", ")}${more}`);
     }
-    for (const [at, [grasp, { row, full, share }]] of [...this.rows].entries()) {
+    for (const [at, [grasp, { row, bar, share }]] of [...this.rows].entries()) {
       const value = frame.probabilities?.[at] ?? (grasp === frame.grasp ? frame.probability : null);
-      full.style.transform = `scaleX(${value ?? 0})`;
+      bar.value = value ?? 0;
       if (grasp === frame.grasp) row.setAttribute("aria-current", "true");
       else row.removeAttribute("aria-current");
       say(share, value === null ? "–" : `${(100 * value).toFixed(value > 0.9995 || value < 0.0005 ? 0 : 1)} %`);
@@ -168,13 +168,15 @@ export class View {
   }
 
   // For screen readers: a text that was stable for a second, at most every three seconds.
-  #announce(grasp, now, atOnce = false) {
-    const { said } = this;
-    if (said.candidate !== grasp) Object.assign(said, { candidate: grasp, since: now });
-    const settled = now - said.since >= SETTLED_MS && now - said.at >= QUIET_MS;
-    if (grasp !== said.text && (atOnce || settled)) {
-      Object.assign(said, { text: grasp, at: now });
-      say($("spoken"), grasp);
-    }
+  #announce(text, wait = Math.max(SETTLED_MS, this.#spokenAt + QUIET_MS - performance.now())) {
+    if (text === this.#next) return;
+    this.#next = text;
+    clearTimeout(this.#timer);
+    const speak = () => {
+      this.#spokenAt = performance.now();
+      say($("spoken"), text);
+    };
+    if (wait) this.#timer = setTimeout(speak, wait);
+    else speak(); // before another text can take its place
   }
 }

@@ -1,44 +1,6 @@
-// The WebSocket of a page: every message to the handler of its topic; it reconnects automatically. And parts of the page.
+// Parts of every page: elements, texts, tables and menus; and when and how a canvas is painted.
 
-const FIRST_MS = 250;
-const LONGEST_MS = 5000;
 const DARK = "(prefers-color-scheme: dark)";
-
-/**
- * Connect to the server of this page.
- * @param {...Object<string, function(object): void>} handlers by topic; "open" and "closed" are events of the connection
- * itself; the server sends these topics
- * @returns {function(object): boolean} send({do: ..., ...}), which returns false while there is no connection
- */
-export function connect(...handlers) {
-  let socket = null;
-  let wait = FIRST_MS;
-
-  const topics = new Set(handlers.flatMap(Object.keys));
-  const take = (message) => handlers.forEach((some) => some[message.topic]?.(message));
-
-  function open() {
-    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    socket = new WebSocket(`${scheme}//${location.host}/live?topics=${[...topics]}`);
-    socket.addEventListener("open", () => {
-      wait = FIRST_MS;
-      take({ topic: "open" });
-    });
-    socket.addEventListener("message", (event) => take(JSON.parse(event.data)));
-    socket.addEventListener("close", () => {
-      take({ topic: "closed" });
-      setTimeout(open, wait);
-      wait = Math.min(2 * wait, LONGEST_MS);
-    });
-  }
-
-  open();
-  return (asked) => {
-    if (socket.readyState !== WebSocket.OPEN) return false;
-    socket.send(JSON.stringify(asked));
-    return true;
-  };
-}
 
 export const $ = (id) => document.getElementById(id);
 

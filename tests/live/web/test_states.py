@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -113,6 +114,53 @@ def test_a_page_without_its_server_says_since_when_there_is_no_data(page: Callab
     browser.log()  # of the server that is gone
 
 
+def test_a_page_asks_a_server_that_is_gone_less_and_less_often(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    browser.script("""const Real = WebSocket;
+        window.asked = [];
+        window.WebSocket = class extends Real {
+          constructor(address) {
+            asked.push([performance.now(), String(address)]);
+            super(address);
+          }
+        };""")
+    run.server.close()
+    browser.wait(lambda: browser.script("return asked.length") >= 4)
+    asked = browser.script("return asked")
+    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(asked)]
+    assert all(gap >= least - 2 for gap, least in zip(gaps, (500, 1000, 2000), strict=False))
+    # Browsers of some years ago take no others.
+    assert all(address.startswith("ws://127.0.0.1:") for _, address in asked)
+    browser.log()  # of the server that is gone
+
+
+# A drawing of switches of 1 mm, so many millimetres apart, on a small screen: where each can be pressed.
+_AREAS = """const [apart, done] = arguments;
+    import("/hand.js").then(({ drawHand, draw }) => {
+      const svg = draw("svg"), hand = { view: "", placed: true, radius_mm: 1, strips: [], creases: [], labels: [] };
+      svg.style.width = "240px";
+      document.body.append(svg);
+      const switches = [0, 1, 2].map((bit) => ({ name: `s${bit}`, x_mm: apart * bit, y_mm: 0, bit }));
+      const outline = [[-100, 0], [100, 0], [0, 100]];
+      drawHand(svg, { ...hand, outline, switches, taxels: [], joints: [] }, { onSwitch: () => {} });
+      const areas = [...svg.querySelectorAll(".area")].map((area) => area.getBoundingClientRect());
+      done(areas.map(({ left, right }) => [left, right]));
+      svg.remove();
+    });"""
+
+
+@pytest.mark.parametrize(("apart", "least"), [(45, 24), (12, 11)])
+def test_a_finger_presses_a_switch_on_a_small_screen(
+    page: Callable[..., Run], browser: Any, apart: int, least: int
+) -> None:
+    page()
+    areas = browser.driver.execute_async_script(_AREAS, apart)
+    assert len(areas) == 3
+    assert all(right - left > least - 0.5 for left, right in areas)
+    # None is on another.
+    assert all(right <= left + 0.5 for (_, right), (left, _) in pairwise(areas))
+
+
 def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run], browser: Any) -> None:
     run = page(silent_us=300_000_000)
     for number, age_s in enumerate((90, 90, 90, 290, 310)):
@@ -150,12 +198,12 @@ def test_a_build_without_an_empty_hand_says_so_beside_the_grasp(page: Callable[.
 def test_bars_and_numbers_are_of_one_frame(page: Callable[..., Run], browser: Any) -> None:
     run = page()
     pairs = """return [...document.querySelectorAll('#types li')].map((row) => [
-        row.querySelector('.share').textContent, row.querySelector('.bar span').style.transform])"""
+        row.querySelector('.share').textContent, row.querySelector('progress').value])"""
     for step in range(200):
         share = step / 200
         run.say(probabilities=[share, 1 - share])
         for words, bar in browser.script(pairs):
-            assert words in ("", "–") or abs(float(words[:-2]) / 100 - float(bar[7:-1])) < 0.002
+            assert words in ("", "–") or abs(float(words[:-2]) / 100 - bar) < 0.002
 
 
 def test_the_gloves_state_stands_in_the_bar_until_it_is_old(page: Callable[..., Run], browser: Any) -> None:
@@ -303,9 +351,10 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             if asked["numbers"] == [0, 0, 0]:
                 return message("overview", overview)
             return message("overview", overview | {"have": asked["numbers"], "changes": [[], []], "truth": []})
-        at = asked["numbers"][0]
-        grasp = [grasp for time_us, grasp in first if time_us <= at][-1]
-        return message("moments", from_us=at, to_us=at, frames=[told(replace(GRASP, grasp=grasp, time_us=at))])
+        (second,) = asked["numbers"]
+        shown = [told(replace(GRASP, grasp=grasp, time_us=time_us)) for time_us, grasp in first]
+        before = [one for one in shown if one["time_us"] < 10**6 * (second + 1)]
+        return message("moments", second=second, frames=before)
 
     with Server("live", "127.0.0.1:0", token=None, on_message=reply) as server:
         server.publish("replay", message("replay", about))
@@ -320,6 +369,7 @@ def test_a_wrong_prediction_is_wrong_in_all_places(browser: Any) -> None:
             browser.script("location.hash = `t=${arguments[0]}`", seconds)
             texts = (grasp, said, other)
             browser.wait(lambda texts=texts: tuple(map(browser.text, ("grasp", "truth", "other"))) == texts)
+            browser.wait(lambda told=other: told.replace(": ", " announced ") in browser.text("place").split(" · "))
             wrong = said.startswith("✗")
             sign = "return getComputedStyle(document.getElementById('grasp'), '::after').content"
             assert ("✗" in browser.script(sign)) == wrong

@@ -4,6 +4,7 @@ import hmac
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from threading import Event
 from typing import Any
 
 import pytest
@@ -312,6 +313,28 @@ def test_so_many_connections_and_no_more(serve: Callable[..., Any], monkeypatch:
             assert ended(fifth)
         idle[0].close()
         eventually(lambda: served(client))
+
+
+def test_of_many_connections_at_once_the_first_ones_stay(
+    serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "MOST_CONNECTIONS", 4)
+    asked, all_there = Event(), Event()
+
+    def reply(_: object) -> None:
+        asked.set()
+        all_there.wait(PATIENCE_S)
+
+    client = serve(on_message=reply)
+    with ExitStack() as stack:
+        live = stack.enter_context(client.open())
+        live.send('{"do":"wait"}')
+        assert asked.wait(PATIENCE_S)
+        # The server's thread waits, and finds all of them in one turn.
+        some = [stack.enter_context(connection(client, b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")) for _ in range(8)]
+        all_there.set()
+        assert [ended(made) for made in some] == [False] * 3 + [True] * 5
+        assert client.server.pages == 1
 
 
 def ended(made: socket.socket) -> bool:

@@ -16,7 +16,7 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.web import replay as module
-from thenar.runtime.web.replay import MOST_MOMENTS, Replay
+from thenar.runtime.web.replay import Replay
 
 NAMES = tuple(f"s{number}" for number in range(6))
 HARNESS = f'name = "mine"\n[[stream]]\nport = "/dev/none"\nswitches = {list(NAMES)}\n'.replace("'", '"')
@@ -58,6 +58,12 @@ def asked(replay: Replay, do: str, *numbers: object) -> dict[str, Any]:
     return found
 
 
+def moment_at(replay: Replay, time_us: int) -> dict[str, Any]:
+    """Return what a page shows at a time."""
+    frames: list[dict[str, Any]] = asked(replay, "moments", time_us // 10**6)["frames"]
+    return [frame for frame in frames if frame["change"][0] <= time_us][-1]
+
+
 def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
     folder: Path, replay: Callable[..., Replay]
 ) -> None:
@@ -69,7 +75,7 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
     for number, row in enumerate(rows):
         grasp = build.recognise(np.array([row >> bit & 1 for bit in range(6)], bool), np.zeros(0, int)).grasp
         at = first + number * HELD_US + 900_000
-        frame = asked(shown, "moments", at, at, 1)["frames"][0]
+        frame = moment_at(shown, at)
         assert (frame["closed"], frame["grasp"]) == (f"{row:06b}"[::-1], grasp)
         assert at - 20_000 < frame["change"][0] <= at
         announced = [change[1] for change in overview["changes"][0] if change[0] <= at][-1]
@@ -80,7 +86,7 @@ def test_what_the_build_makes_of_a_collection_stands_beside_its_labels(
         (2, HELD_US - 1, "pinch"),
     ]
     assert overview["truth"][1][1] - first == HELD_US
-    (final,) = asked(shown, "moments", last + 10**9, last + 2 * 10**9, 1)["frames"]
+    (final,) = asked(shown, "moments", last // 10**6 + 1000)["frames"]
     assert last - 10_000 <= final["change"][0] <= last
     about = json.loads(shown.about)
     assert (about["topic"], about["name"], about["builds"]) == ("replay", "anna.mcap", [folder.name])
@@ -98,28 +104,26 @@ def test_a_result_that_is_undone_leaves_no_label(folder: Path, tmp_path: Path) -
         assert found["truth"] == [[1, found["first_us"], found["first_us"] + 9, "hook"], [1, 0, 0, ""]]
 
 
-def test_pages_get_moments_of_the_span_and_interval_that_they_ask_for(replay: Callable[..., Replay]) -> None:
+def test_pages_get_the_moments_of_each_second_that_they_ask_for(replay: Callable[..., Replay]) -> None:
     shown = replay(1, 2, 3)
     overview = asked(shown, "overview", 0, 0)
     first, last = overview["first_us"], overview["last_us"]
-    random = np.random.default_rng(2)
-    changes = [change[0] for change in overview["changes"][0]]
-    for _ in range(200):
-        begin, length = (int(number) for number in random.integers((first - 10**5, 0), (last + 10**5, 10**6)))
-        step = int(random.integers(1, 200_000))
-        found = asked(shown, "moments", begin, begin + length, step)
-        times = [frame["change"][0] for frame in found["frames"]]
-        assert times[0] <= max(begin, first)
-        assert all(later - earlier >= step for earlier, later in pairwise(times))
-        assert all(begin < time_us <= begin + length for time_us in times[1:])
-        # What it does not have, between two, is another moment so late or later: kept ones are 20 ms apart.
-        ends = [*times[1:], found["to_us"]]
-        assert all(later - earlier <= step + 20_000 for earlier, later in zip(times, ends[:-1], strict=False))
-        assert found["from_us"] == begin
-        assert (found["to_us"] == begin + length) == (len(times) < MOST_MOMENTS) or found["to_us"] >= times[-1]
+    joined, newest = list[int](), first
+    for second in range(first // 10**6 - 2, last // 10**6 + 3):
+        found = asked(shown, "moments", second)
+        assert found["second"] == second
+        current, *times = [frame["change"][0] for frame in found["frames"]]
+        # What was current when it began; before the recording, its first.
+        assert current == (newest if second * 10**6 >= first else first)
+        assert all(second * 10**6 <= time_us < (second + 1) * 10**6 for time_us in times)
+        joined += [time_us for time_us in (current, *times) if time_us not in joined]
+        newest = joined[-1]
+    # Kept ones are 20 ms apart, as frames of every 10 ms allow, to the end.
+    assert (joined[0], joined) == (first, sorted(joined))
+    assert all(later - earlier <= 20_000 for earlier, later in pairwise(joined))
+    assert last - joined[-1] <= 10_000
     # At a change of the announced type there is a moment, so that a page that goes there shows it.
-    for time_us in changes:
-        assert asked(shown, "moments", time_us, time_us, 1)["frames"][0]["change"][0] == time_us
+    assert {change[0] for change in overview["changes"][0]} <= set(joined)
 
 
 def test_the_overview_comes_in_parts_that_join(replay: Callable[..., Replay], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,25 +164,26 @@ HUGE = 2**62
         "0,0,1",
         {},
         (),
-        (0, 1),
+        (0, 1, 2),
         (0, 1, 2, 3),
-        (0, 1, None),
-        (0, 1, "1"),
-        (0, 1, True),
-        (0, 1.5, 1),
-        (0, float("nan"), 1),
-        (float("inf"), 1, 1),
-        (HUGE, 0, 1),
-        (0, -HUGE, 1),
-        (0, 0, 10**400),
-        [[0], 1, 1],
+        (None,),
+        ("1",),
+        (True,),
+        (1.5,),
+        (float("nan"),),
+        (float("inf"),),
+        (HUGE,),
+        (-HUGE,),
+        (10**400,),
+        [[0]],
     ],
 )
-def test_what_is_no_span_is_refused_in_a_sentence(replay: Callable[..., Replay], numbers: object) -> None:
+def test_what_is_no_number_is_refused_in_a_sentence(replay: Callable[..., Replay], numbers: object) -> None:
     shown = replay(1, 2)
-    for do in ("moments", "overview"):
-        with pytest.raises(SettingError, match=f"for the {do} of a recording, a page must send . whole numbers"):
-            shown.reply({"do": do, "numbers": numbers if do == "moments" or numbers != (0, 1) else (0, 1, 2)})
+    for do, count, more in (("moments", 1, ()), ("overview", 2, (0,))):
+        given = [*numbers, *more] if isinstance(numbers, list | tuple) else numbers
+        with pytest.raises(SettingError, match=f"for the {do} of a recording, a page must send {count} of `n"):
+            shown.reply({"do": do, "numbers": given})
     others: tuple[object, ...] = ("delete", "", None, 1, [], "x" * 10**6)
     for wrong in others:
         with pytest.raises(SettingError, match="a page can ask for the overview or for moments") as refusal:
@@ -192,15 +197,20 @@ def test_whatever_span_is_asked_for_a_reply_is_bounded(
     shown = replay(*range(1, 9))
     edges = (-HUGE + 1, -1, 0, 1, 10**6, 5 * 10**6, HUGE - 1)
     for begin in edges:
+        assert 1 <= len(asked(shown, "moments", begin)["frames"]) <= 102
         for end in edges:
-            for step in edges:
-                found = asked(shown, "moments", begin, end, step)
-                assert 1 <= len(found["frames"]) <= MOST_MOMENTS
             assert len(asked(shown, "overview", begin, end)["truth"]) <= 7
+    second = asked(shown, "overview", 0, 0)["first_us"] // 10**6 + 1
+    whole = asked(shown, "moments", second)["frames"]
     monkeypatch.setattr(module, "MOST_BYTES", 2_000)
-    text = shown.reply({"do": "moments", "numbers": (0, HUGE - 1, 1)})
-    largest = max(len(json.dumps(frame)) for frame in json.loads(text)["frames"])
-    assert len(text) < 2_000 + largest + 200
+    text = shown.reply({"do": "moments", "numbers": (second,)})
+    frames = json.loads(text)["frames"]
+    # Fewer of them are still of the whole second.
+    assert 1 <= len(frames) < len(whole)
+    assert frames in [whole[::step] for step in range(2, len(whole))]
+    assert len(text) < 2_000 + max(len(json.dumps(frame)) for frame in frames) + 200
+    monkeypatch.setattr(module, "MOST_BYTES", 1)
+    assert asked(shown, "moments", second)["frames"] == whole[:1]
 
 
 def test_before_it_is_read_a_moment_is_not_claimed(folder: Path, tmp_path: Path) -> None:
@@ -209,10 +219,9 @@ def test_before_it_is_read_a_moment_is_not_claimed(folder: Path, tmp_path: Path)
         assert shown._scanned.wait(60)
         last = shown._times[-1]
         shown._scanned.clear()
-        found = asked(shown, "moments", last + 1, last + 10**6, 1)
-        assert (found["frames"], found["to_us"]) == ([], last)
-        found = asked(shown, "moments", last, last + 10**6, 1)
-        assert ([frame["change"][0] for frame in found["frames"]], found["to_us"]) == ([last], last)
+        for second in (last // 10**6, last // 10**6 + 1):
+            assert asked(shown, "moments", second)["frames"] == []
+        assert asked(shown, "moments", last // 10**6 - 1)["frames"][-1]["change"][0] // 10**6 == last // 10**6 - 1
 
 
 def test_a_recording_that_lacks_an_input_of_the_build_is_refused(folder: Path, tmp_path: Path) -> None:
