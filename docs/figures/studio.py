@@ -106,7 +106,7 @@ def main() -> None:
             height = driver.execute_script(_WHOLE)
             with Image.open(BytesIO(driver.get_screenshot_as_png())) as taken:
                 picture = taken.convert("RGB").crop((0, 0, options.width, height))
-                picture.quantize(64, dither=Image.Dither.NONE).save(options.picture, optimize=True)
+                picture.quantize(256, dither=Image.Dither.NONE).save(options.picture, optimize=True)
         finally:
             driver.quit()
 
