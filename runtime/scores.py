@@ -29,7 +29,7 @@ from .model.integers import IntegerTables
 from .model.terms.base import HIGHEST_CODE
 
 LANE_OFFSET = 1 << 15
-# Of the bytes of False and True.
+# The digits for the bytes of False and True.
 _DIGITS = b"0" + b"1" * 255
 # Switches are looked up eight at a time: a byte of a mask indexes its sum of rows.
 _EIGHT = 8
@@ -50,7 +50,7 @@ class Scorer:
     joints_lost                 the contribution of all joints while they are lost
     size, unpack                for a sum that began with `start`: its bytes, and the function that makes K scores of
                                 them, each 2^15 too high
-    rejector                    decides which frames are refused, None if none is
+    rejector                    decides which frames are refused; None if the build refuses none
     none_leads                  the leads of none for a frame that is not refused and for one that is
     """
 

@@ -90,7 +90,7 @@ class TomlText(Struct, frozen=True):
                 content = {key: content}
             depth = _depth(content, place)
             if depth > deepest or (heads and depth == deepest == len(table)):
-                # Of a value of several lines, the first lines that go as deep end with the line.
+                # A value may take several lines: the first of them by which it has these keys is the line.
                 rest = place[len(table) :]
                 more = bisect_left(
                     range(1, len(lines)), depth - len(table), key=lambda end: _depth(_begun(lines[:end]), rest)

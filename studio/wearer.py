@@ -29,8 +29,8 @@ class WearerPage:
 
     def __init__(self, studio: Studio) -> None:
         self._studio, self._project = studio, studio.project
-        # The wearer's sets for the build, as they were last read.
-        self._sets = list[Path]()
+        # The wearer's sets for the build, as they were last read; None before.
+        self._sets: list[Path] | None = None
         requests: dict[str, Handler] = {"wearer": self._name, "adapt": self._job, "unwear": self._undo}
         studio.add(requests, self.read)
 
@@ -54,7 +54,7 @@ class WearerPage:
         if sets:
             # A damaged log of edits hinders neither recording nor undo.
             try:
-                about |= self._trials_shown(base, build)
+                about |= self._trials_shown(self._sets, base, build)
             except ThenarError as reason:
                 about["notes"] = [str(reason)]
         types = [grasp for grasp in build.grasps if grasp != NONE]
@@ -100,11 +100,11 @@ class WearerPage:
         self._project.remember(wearer=asked.name)
         self._studio.changed()
 
-    def _trials_shown(self, base: Path, build: Build) -> dict[str, object]:
-        """Return the numbers of the wearer's trials, by type, what is not used, and the command that adapts to them."""
-        trials, rows, notes = self._project.recordings(self._sets)
+    def _trials_shown(self, paths: Sequence[Path], base: Path, build: Build) -> dict[str, object]:
+        """Return the numbers of the trials in sets, by type, what is not used, and the command that adapts to them."""
+        trials, rows, notes = self._project.recordings(paths)
         added, used = _added(trials, build), {trial[0] for trial in rows}
-        sets = [path for path in self._sets if path.name in used]
+        sets = [path for path in paths if path.name in used]
         counts = Counter(trials.grasps[np.unique(trials.trial_ids, return_index=True)[1]].tolist())
         known = int(np.count_nonzero(trained_on(build.manifest, trials)))
         notes += [f"new types are added: {list_names(added)}"] if added else []
@@ -116,6 +116,8 @@ class WearerPage:
     # The build.
 
     def _job(self, _: Asked) -> Job:
+        if self._sets is None:
+            raise SettingError("the recordings are not read yet: wait until they are")
         if not self._sets:
             raise SettingError(f"no set holds only trials of {self._project.state.wearer}: record some")
         return partial(self.adapt, self._sets)

@@ -94,7 +94,7 @@ class LivePage:
             state = "not connected" if known is None else f"lost since {_clock(0)}"
             self._health, self._lost = health, {name: self._lost.get(name, state) for name in gone}
             self.server.publish("health", partial(message, "health", health))
-            self.server.publish("glove", partial(self._glove_message))
+            self.server.publish("glove", self._glove_message)
 
     def _glove_message(self) -> bytes:
         """Return the message on how the glove is now, "good", "warn" or "bad", and in words."""

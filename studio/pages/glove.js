@@ -110,7 +110,7 @@ function showState(message) {
     connected ? error || "connected" : `lost: ${error}`,
     counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
   ]);
-  // What is said of a device that is lost can be copied.
+  // Equal rows stay, so that one can select and copy what is said of a lost device.
   if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
   $("devices-table").dataset.rows = JSON.stringify(rows);
   fillTable("devices", ["Device", "State", "Counted"], rows);

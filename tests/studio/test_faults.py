@@ -29,6 +29,7 @@ from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.web.server import message
+from thenar.studio.opening import open_studio
 from thenar.studio.project import Project
 from thenar.studio.studio import Station, Studio
 
@@ -65,15 +66,19 @@ def test_a_build_that_is_half_written_hides_nothing_else(
     assert [said.partition(" is")[0] for said in shown["set"]["unused"]] == ["half.grasps"]
 
 
-def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(
-    studio: Start, two_builds: Path, people: GraspSet, hand: HandShape, tmp_path: Path
-) -> None:
+@pytest.fixture
+def worn(two_builds: Path, people: GraspSet, hand: HandShape, tmp_path: Path) -> Path:
+    """Return the folder of a project with two builds, which C wears, and C's trials."""
     folder = tmp_path / "recorded"
     shutil.copytree(two_builds, folder)
     Project(folder, hand).remember(build="more", wearer="C")
     people.rows(people.subjects == "C").save(folder / "C.grasps")
-    (folder / "half.grasps").write_bytes(b"half")
-    (folder / "few" / "build.json").write_bytes(b"{")
+    return folder
+
+
+def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(studio: Start, worn: Path) -> None:
+    (worn / "half.grasps").write_bytes(b"half")
+    (worn / "few" / "build.json").write_bytes(b"{")
     with page(studio(None).server.url, "wearing,adapt") as live:
         shown = until(live, lambda told: bool(told["sets"]))
         assert shown["sets"] == ["C.grasps: 18 trials of 18 frames"]
@@ -83,26 +88,25 @@ def test_a_damaged_set_and_a_damaged_build_are_no_hindrance_to_a_wearer(
         assert {one["topic"]: one.get("folder") or one["base"] for one in told} == {"adapt": "C", "wearing": "more"}
 
 
-def test_recordings_that_cannot_be_used_leave_a_wearer_recording_and_undo(
-    studio: Start, two_builds: Path, people: GraspSet, hand: HandShape, tmp_path: Path
-) -> None:
-    folder = tmp_path / "recorded"
-    shutil.copytree(two_builds, folder)
-    Project(folder, hand).remember(build="more", wearer="C")
-    mine = people.rows(people.subjects == "C")
-    mine.save(folder / "C.grasps")
-    replace(mine, joints=mine.joints[:1], codes=mine.codes[:, :1]).save(folder / "C-2.grasps")
-    (folder / "edits.jsonl").write_text("{}\n{}\n")
+def test_recordings_that_cannot_be_used_leave_a_wearer_recording_and_undo(studio: Start, worn: Path) -> None:
+    mine = GraspSet.load(worn / "C.grasps")
+    replace(mine, joints=mine.joints[:1], codes=mine.codes[:, :1]).save(worn / "C-2.grasps")
+    (worn / "edits.jsonl").write_text("{}\n{}\n")
     opened = studio(None)
     with page(opened.server.url, "wearing") as live:
         shown = until(live, lambda told: bool(told["sets"]))
         assert (shown["why"], shown["base"], len(shown["sets"])) == ("", "more", 2)
-        assert [note.partition(":")[0] for note in shown["notes"]] == [str(folder / "edits.jsonl")]
-        (folder / "edits.jsonl").unlink()
+        assert [note.partition(":")[0] for note in shown["notes"]] == [str(worn / "edits.jsonl")]
+        (worn / "edits.jsonl").unlink()
         opened.changed()
         shown = until(live, lambda told: "adapt" in told)
     assert [note.partition(":")[0] for note in shown["notes"]] == ["C.grasps is left aside"]
     assert "/C.grasps" not in shown["adapt"]
+
+
+def test_a_wearer_whose_recordings_are_not_read_yet_is_asked_to_wait(worn: Path, hand: HandShape) -> None:
+    with open_studio(Project(worn, hand), "127.0.0.1:0", token=None) as opened:
+        assert "not read yet" in refusal(opened, do="adapt")
 
 
 def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ function work({ done, total, what, why, left_s: left }) {
   else say($("work"), why ?? "");
 }
 
-/** Say how far the work is, and how long it takes still. */
+/** Say how far the work is, and how much longer it takes. */
 function countDown() {
   const { what, share, end } = working, left = end === null ? null : (end - performance.now()) / 1000;
   const time = left === null ? "" : left > 1 ? `, about ${duration(left)} left` : ", any moment now";
