@@ -48,6 +48,18 @@ def test_without_columns_it_goes_on_to_the_fit_of_the_rest() -> None:
     assert fit.rows.shape == (13, 4)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_without_columns_the_newest_step_keeps_the_secant_equation(seed: int) -> None:
+    """The estimated inverse Hessian turns the change of the gradient into the step (Nocedal and Wright, 6.6)."""
+    fit = Logistic(*grasps(seed), 4)
+    fit.improve(12)
+    for one in (fit, fit.without([2, 7])):
+        step, turned, curvature = one._pairs[-1]
+        assert curvature > 0
+        one._gradient = turned
+        np.testing.assert_allclose(-one._direction(), step, rtol=1e-9, atol=1e-12)
+
+
 def test_the_order_of_the_rows_changes_no_bit() -> None:
     bits, labels = grasps(7)
     order = np.random.default_rng(1).permutation(len(labels))
