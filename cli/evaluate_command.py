@@ -36,9 +36,9 @@ from .printing import json_flag, out, progress, show, table, wants_json, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.stream_study import StreamStudy, SubjectMean
-    from thenar.compiler.artifact.wearers import WearerStudy
     from thenar.compiler.evaluation.study import Study, StudyRun
     from thenar.compiler.evaluation.tables import RateTable
+    from thenar.compiler.wearer_study import WearerStudy
     from thenar.runtime.recipe import Recipe
 
 _USUAL = ("compositions", "generality", "pruning", "baselines")
@@ -207,8 +207,8 @@ def _evaluate_people(
     import numpy as np
 
     from thenar.compiler.artifact.stream_study import study_streams
-    from thenar.compiler.artifact.wearers import study_wearers
     from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.compiler.wearer_study import study_wearers
 
     with progress("adapting to each subject" if numbers else "evaluating streams", lines=not numbers) as report:
         grasp_set = GraspSet.load(grasps)

@@ -83,6 +83,14 @@ def _timed() -> tuple[str, ...]:
     type=click.Choice(("subject", "trial")),
     help="Choose points by left-out subjects, or by trials of all subjects.  [default: subject, if several]",
 )
+@click.option(
+    "--adapt",
+    "own",
+    type=click.IntRange(0, 1000),
+    default=0,
+    metavar="N",
+    help="Evaluate the points for new subjects after N own trials of each type, too.",
+)
 @jobs_option()
 @json_flag
 @click.pass_context

@@ -38,6 +38,7 @@ from ..samples import Samples
 from ..scan_file import SCAN_NAME, scanmap_to_bytes
 from ..trainers.base import SHARED, Report, Training
 from ..wearer import STRENGTH
+from ..wearer_study import related_joints
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents
 from .ensemble import ensemble_to_bytes
@@ -53,7 +54,6 @@ from .training import (
     stored_digests,
 )
 from .verify_firmware import made_firmware
-from .wearers import related_joints
 
 # Without a harness a build has no scan map; a build too large for every microcontroller has no firmware; one without a
 # report has no spec.

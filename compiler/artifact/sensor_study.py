@@ -37,9 +37,9 @@ from ..samples import Columns, Samples, decided
 from ..text import counted
 from ..trainers.base import Report, Training
 from ..wearer import STRENGTH
+from ..wearer_study import Hits, hits_of
 from ..workers import in_workers
 from .training import Cut, cuts_of, samples_of
-from .wearers import Hits, hits_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -27,10 +27,10 @@ from ..recordings.graspset import GraspSet
 from ..recordings.summary import check_trials
 from ..samples import Samples
 from ..trainers.base import Report, Training
+from ..wearer_study import Hits, chosen_strength, hits_of
 from ..workers import check_memory, in_workers, little
 from . import CompileError
 from .ensemble import MAX_STUMPS
-from .wearers import Hits, chosen_strength, hits_of
 
 USUAL_ROUNDS = 100  # assumed amount of work where the fit is still to be chosen
 # The scores of a fold's test rows, and what adapting to people left out brings.

@@ -10,7 +10,7 @@ from msgspec.structs import replace as changed_to
 
 from thenar.runtime.recipe import Recipe
 
-from ..evaluation.rates import Draws
+from ..evaluation.rates import Draws, Rate
 from ..trainers.base import TRAINERS, Training
 from .finalists import EvaluatedFinalist, Screened
 from .points import FrontierPoint, PointSetting, PointTime, front
@@ -126,9 +126,14 @@ def _effort(design: Design) -> tuple[float, ...]:
 
 
 def points_of(
-    designs: Sequence[Design], luck: Mapping[TrialAccuracy, float], survey: Survey
+    designs: Sequence[Design],
+    luck: Mapping[TrialAccuracy, float],
+    adapted: Mapping[Recipe, Rate | None],
+    survey: Survey,
 ) -> tuple[FrontierPoint, ...]:
-    """Return the points on a front, numbered from the fastest frame on; `luck` is subtracted from each rate."""
+    """Return the points on a front, numbered from the fastest frame on; `luck` is subtracted from each rate, `adapted`
+    has those after adaptation.
+    """
     fronts = dict(zip(("frame", "switches"), best_designs(designs), strict=True))
     best = [design for design in designs if any(design in some for some in fronts.values())]
     points = []
@@ -154,6 +159,7 @@ def points_of(
                 chips=0 if wired is None else wired.chips,
                 fronts=tuple(name for name, some in fronts.items() if design in some),
                 joints=joints,
+                adapted=adapted.get(design.tables.recipe),
             )
         )
     return tuple(points)

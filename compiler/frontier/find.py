@@ -55,7 +55,7 @@ _WIDER = 3
 # Number of placements to try with fewer joints.
 _FEWER = 5
 # Calls of `Cache.ask`: the calibration, four to screen, four with fewer joints, three with other trainers, five for the
-# finalists, the simulations.
+# finalists, the simulations; one more for own trials.
 _ROUNDS = 18
 _UNTIMED = "the time of reading the joints ({}) is unknown and is left out of every frame time: give it with --joint-us"
 
@@ -71,6 +71,7 @@ def find_frontier(
     budget_us: float | None = None,
     rate: float | None = None,
     joint_us: float | None = None,
+    own: int = 0,
     limits: Limits | None = None,
     jobs: int = -1,
     report: Report | None = None,
@@ -103,6 +104,8 @@ def find_frontier(
         Time of reading all joints, in microseconds. By default it is that of a CyberGlove's record, as measured for
         the harness, else by the vendor's formula; of other joints it is left out of every frame, and a sentence of
         `skipped` says so.
+    own : int
+        Evaluate the points for new subjects after so many own trials of each type, too; 0: not.
     limits : Limits, optional
         The sensors to keep or to leave out, and prices, for a search among sensors.
     jobs : int
@@ -137,10 +140,12 @@ def find_frontier(
     if limits is not None and not search.by_sensors:
         raise FrontierError("``have``, ``never`` and ``prices`` are for ``sensors`` or ``price``: add one of these")
     cuts = Cuts.of(samples, search)
+    if own and not cuts.subjects:
+        raise FrontierError("own trials are of a new subject, who is left out: record two or more subjects")
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS, jobs=jobs)
+        cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS + bool(own), jobs=jobs)
         with _remove_created_on_error(created, store):
             equipment = equipment_for(grasp_set, harness, target, cache, joint_us)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache, limits)
@@ -152,7 +157,7 @@ def find_frontier(
             if rough is not None:
                 rough(early)
 
-        frontier = _found(survey, show_rough)
+        frontier = _found(survey, own, show_rough)
         frontier = changed_to(
             frontier,
             skipped=(*untimed, *frontier.skipped),
@@ -215,7 +220,7 @@ def kept_entries(folder: Path) -> list[str]:
     return [path for path in there if path not in _DOCUMENTS]
 
 
-def _found(survey: Survey, rough: Callable[[Frontier], None]) -> Frontier:
+def _found(survey: Survey, own: int, rough: Callable[[Frontier], None]) -> Frontier:
     """Return the frontier of a survey, without a picked point; call `rough` with what the first screening tried."""
     search, equipment, n_switches = survey.search, survey.equipment, survey.samples.n_switches
     screened = screen(survey)
@@ -254,6 +259,7 @@ def _found(survey: Survey, rough: Callable[[Frontier], None]) -> Frontier:
         never=() if survey.limits is None else survey.limits.never,
         price=search.price,
         prices={} if survey.limits is None else dict(survey.limits.prices),
+        own=own,
         skipped=(*claimed, *notes),
     )
     rough(frontier)
@@ -272,10 +278,11 @@ def _found(survey: Survey, rough: Callable[[Frontier], None]) -> Frontier:
     kept = list(dict.fromkeys(design for front in best_designs(designs) for design in front))
     times = survey.measured(design.tables.content for design in kept)
     kept = [replace(design, measured=times.get(design.tables.content)) for design in kept]
+    adapted = survey.adapted([design.tables.recipe for design in kept], own) if own else {}
     return changed_to(
         frontier,
         combinations=len(designs) + len(tried),
-        points=points_of(kept, luck, survey),
+        points=points_of(kept, luck, adapted, survey),
         tried=tried,
         marks=marks_of(recipes, finalists, survey),
     )

@@ -99,6 +99,7 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     luck        the optimism of picking the best of all that was tried (`evaluation.rates.Draws`)
     frames      the rate of single frames, uncorrected (None: a trial has one frame)
     other_rate  the other of the two, uncorrected (None: only one subject)
+    adapted     the rate of new subjects after a frontier's `own` trials a type, uncorrected (None: not asked for)
     scan        reading the switches; transfer: the joints
     frame       max(scan, transfer) + classify: the two use separate lines
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
@@ -122,6 +123,7 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     chips: Count
     fronts: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
+    adapted: Rate | None = None
 
     @property
     def by_sensors(self) -> bool:
@@ -167,6 +169,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     n_levels  most levels of the n_taxels to choose from, in addition to the switches
     picked   number of the point selected by the given budget or rate; None if neither was given
     have, never, price, prices  the limits of the sensors, if these were chosen
+    own      number of own trials of each type to which a new subject's build is adapted; 0: none is
     skipped  sentences: measurements that were not possible here, and options that were left out
     """
 
@@ -198,6 +201,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     never: tuple[Name, ...] = ()
     price: Value | None = None
     prices: dict[Name, Value] = {}
+    own: Count = 0
 
     @property
     def trainers(self) -> tuple[str, ...]:
@@ -268,7 +272,7 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
         yield "does not number its points 1, 2, 3 and so on"
     if frontier.picked is not None and not 1 <= frontier.picked <= len(frontier.points):
         yield f"picked point {frontier.picked}, which it does not have"
-    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.other_rate)]
+    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.other_rate, point.adapted)]
     rates += [each.rate for each in frontier.tried] + [mark.rate for mark in frontier.marks]
     if not all(rate is None or 0 <= rate.low <= rate.mean <= rate.high <= 1 for rate in rates):
         yield "has a rate that is no share"

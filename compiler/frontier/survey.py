@@ -25,6 +25,8 @@ from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples, decided
 from ..trainers.base import Training
+from ..wearer import STRENGTHS
+from ..wearer_study import Hits, hits_of, rate_after_adaptation
 from .cache import Cache, stored
 from .points import By, PointTime
 from .price import Equipment, PricedTables, count_steps, price, time_here
@@ -264,6 +266,27 @@ class Survey:
         }
         return self._ask(fit_stages, calls)
 
+    def adapted(self, recipes: Iterable[Recipe], own: int) -> dict[Recipe, Rate | None]:
+        """Return the accuracy of the subjects left out after `own` trials a type of theirs, for recipes with their
+        rounds; None if nobody has more trials.
+        """
+        calls = {
+            (recipe, fold): (
+                self.samples,
+                fold,
+                self.selection(recipe, fold),
+                self.training(recipe, fold),
+                recipe.rounds or 1,
+                own,
+            )
+            for recipe in recipes
+            for fold in self.cuts.subjects
+        }
+        people: dict[Recipe, list[Hits]] = {}
+        for (recipe, _), hits in self._ask(adapt_to_left_out, calls).items():
+            people.setdefault(recipe, []).extend(hits)
+        return {recipe: rate_after_adaptation(hits) if hits else None for recipe, hits in people.items()}
+
     def prices(
         self, tables: Mapping[Recipe, tuple[Recipe, ...]], rows: Rows, *, lost: bool = False
     ) -> dict[Recipe, tuple[PricedTables, ...]]:
@@ -357,6 +380,17 @@ def fit_stages(
         tables=tuple(tuple(trials for trials, _ in row) for row in by_table),
         frames=tuple(tuple(frames for _, frames in row) for row in by_table),
     )
+
+
+@stored(1)
+def adapt_to_left_out(
+    samples: Samples, fold: Fold, selection: InputSelection, training: Training, rounds: int, own: int
+) -> list[Hits]:
+    """Train on a fold's training rows, and adapt to each subject of its test rows by `own` trials a type with every
+    strength; see `hits_of`.
+    """
+    (recogniser,) = Recogniser.stages(samples, Recipe(), fold.train, selection, training, (rounds,))
+    return hits_of(recogniser, samples.rows(fold.test), [(own, strength) for strength in STRENGTHS])
 
 
 def _packed(predictions: Rows, test: Samples) -> tuple[bytes, bytes]:

@@ -138,9 +138,11 @@ LUCK = (
 def folds_of(frontier: Frontier) -> str:
     """Return the protocol of the rates by which points are chosen: "new subject: each of 3 subjects left out"."""
     if frontier.by == "new subject":
-        return f"New subject, trials: the {counted(frontier.subjects, 'subject')} left out in turn"
-    repeats = counted(frontier.repeats, "repeat")
-    return f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
+        folds = f"New subject, trials: the {counted(frontier.subjects, 'subject')} left out in turn"
+    else:
+        repeats = counted(frontier.repeats, "repeat")
+        folds = f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
+    return f"{folds}; own trials adapt a new subject's model, the others are tested" if frontier.own else folds
 
 
 def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | None]]:
@@ -152,6 +154,8 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | N
         found[f"{frontier.by}, frames"] = lambda point: point.frames
     if frontier.other is not None:
         found[frontier.other] = lambda point: point.other_rate
+    if frontier.own:
+        found[f"after {counted(frontier.own, 'own trial')} a type"] = lambda point: point.adapted
     return found
 
 
@@ -170,8 +174,8 @@ def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of names, and a line for each point.
 
     The columns of trainer and settings are only there if a point's are not the defaults. Rates are in 0..1, times in
-    microseconds; `frames` and `other_rate` may be empty. `fronts`, `switches` and `settings` are lists within a cell,
-    separated by semicolons; names with a semicolon or a quote are quoted as in CSV.
+    microseconds; `frames`, `other_rate` and `adapted` may be empty. `fronts`, `switches` and `settings` are lists in a
+    cell, separated by semicolons; names with a semicolon or a quote are quoted as in CSV.
     """
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
@@ -189,7 +193,8 @@ def _cells(point: FrontierPoint) -> dict[str, object]:
     row: dict[str, object] = {"number": point.number, "fronts": _list(point.fronts), "n_switches": len(point.switches)}
     row |= {"inputs": setting.inputs, "method": placement.method, "parameter": placement.parameter}
     row |= {"rounds": setting.rounds, "width": setting.width, "wiring": setting.wiring, "clock_hz": setting.clock_hz}
-    for name, rate in (("rate", point.rate), ("frames", point.frames), ("other_rate", point.other_rate)):
+    kinds = ("rate", point.rate), ("frames", point.frames), ("other_rate", point.other_rate), ("adapted", point.adapted)
+    for name, rate in kinds:
         numbers = ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
         row |= zip((f"{name}_of", name, f"{name}_low", f"{name}_high"), numbers, strict=True)
         if name == "rate":

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import softmax
 
-from thenar.compiler.artifact.wearers import chosen_strength
 from thenar.compiler.wearer import FREE, STRENGTH, STRENGTHS, Adaptation, correlations
+from thenar.compiler.wearer_study import chosen_strength
 from thenar.drivers.errors import SettingError
 from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.model.terms.grid import Grid

@@ -8,11 +8,11 @@ import pytest
 
 from thenar.compiler import Build, GraspSet, adapt, compile_build, verify
 from thenar.compiler.artifact import CompileError
-from thenar.compiler.artifact.wearers import study_wearers
 from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own, tasks_of
 from thenar.compiler.samples import select_inputs
+from thenar.compiler.wearer_study import study_wearers
 from thenar.runtime.model.integers import MAX_CLASSES
 from thenar.runtime.recipe import Recipe, changed
 

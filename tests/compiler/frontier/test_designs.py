@@ -104,7 +104,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
-    points = points_of(several, {each.judged: 0.01 for each in several}, SURVEY)
+    points = points_of(several, {each.judged: 0.01 for each in several}, {}, SURVEY)
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
     fronts = {len(point.switches): point.fronts for point in points}
     assert fronts == {20: ("frame", "switches"), 10: ("switches",)}
@@ -113,7 +113,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
 
 def test_luck_lowers_a_points_rate_and_its_intervals_lower_end() -> None:
     design = next(designs_of(close_of(20, 0.9)))
-    (point,) = points_of([design], {design.judged: 0.25}, SURVEY)
+    (point,) = points_of([design], {design.judged: 0.25}, {}, SURVEY)
     found = design.judged.rate
     assert (point.rate.mean, point.rate.low, point.rate.high) == pytest.approx(
         (found.mean - 0.25, found.low - 0.25, found.high)
@@ -126,7 +126,7 @@ def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None
     usual = {own.name: own.default for own in TRAINERS["logit"].settings}
     chosen = Training("logit", {**usual, "penalty": 17.0, "max_bins": 8})
     surveyed: Any = Surveyed(chosen)
-    (point,) = points_of([design], {design.judged: 0.0}, surveyed)
+    (point,) = points_of([design], {design.judged: 0.0}, {}, surveyed)
     setting = point.setting
     assert (setting.trainer, setting.settings, setting.max_bins, setting.rounds) == (
         "logit",

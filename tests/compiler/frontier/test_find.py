@@ -6,6 +6,7 @@ from contextlib import closing
 from dataclasses import replace as replace_rows
 from functools import cache
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,10 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.trainers.base import TRAINERS
 from thenar.compiler.trainers.logitboost import boost
+from thenar.compiler.wearer_study import study_wearers
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.model.quantise import quantise
+from thenar.runtime.recipe import Recipe, changed
 from thenar.runtime.scores import Scorer
 
 from ..conftest import make_set, with_none
@@ -178,6 +181,24 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
         assert point.rate.correct == (sum(alone),)
 
 
+def test_points_after_own_trials_are_those_that_evaluate_finds(tmp_path: Path) -> None:
+    grasp_set = make_set(subjects=3)
+    given = {"penalty": 1.0, "smoothness": 1.0}
+    request = asked(tmp_path, grasp_set, own=2, trainer="linear", settings=given)
+    found = found_of(request)
+    assert found.points
+    for point in found.points:
+        options = picked(tmp_path / "out" / "frontier.json", point.number, grasp_set).options
+        row = study_wearers(grasp_set, changed(Recipe(), options), (2,), 1).rows[0]
+        assert point.adapted is not None
+        # All of the three have as many trials.
+        assert point.adapted.mean == pytest.approx(fmean(row.people))
+        assert (point.adapted.over, point.adapted.total) == (3, 96 - 3 * 4 * 2)
+    with pytest.raises(FrontierError, match="record two or more subjects"):
+        found_of(request | {"grasp_set": make_set(), "output": tmp_path / "alone"})
+    assert not (tmp_path / "alone").exists()
+
+
 def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path) -> None:
     """Every row ten times: with copies on both sides of a fold every rate would be 100 %, over 960 units."""
     grasp_set = make_set(subjects=2)
@@ -221,7 +242,7 @@ def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: 
 def test_progress_grows_to_its_end(tmp_path: Path) -> None:
     told = list[tuple[int, int]]()
     grasp_set = make_set(rows=400, subjects=3)
-    found_of(asked(tmp_path, grasp_set, report=lambda done, total: told.append((done, total))))
+    found_of(asked(tmp_path, grasp_set, own=1, report=lambda done, total: told.append((done, total))))
     assert len({total for _, total in told}) == 1
     assert told == sorted(told)
     assert told[-1][0] == told[-1][1]

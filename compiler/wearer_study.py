@@ -1,4 +1,4 @@
-"""Accuracy after adaptation to people left out: `compile` chooses the strength by it, `evaluate` prints it."""
+"""Accuracy after adaptation to people left out, by which `compile` chooses the strength."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -9,20 +9,20 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Of, Recognised
+from thenar.runtime.manifest import Recognised
 from thenar.runtime.model.tables import ScoreTables, winners
 from thenar.runtime.recipe import Recipe
 
-from ..evaluation.folds import EvaluationError, Fold, leave_one_out
-from ..evaluation.rates import RecipeWords, clustered, student
-from ..model.collapse import collapse
-from ..recogniser import Recogniser
-from ..recordings.graspset import GraspSet
-from ..samples import Samples, decided
-from ..text import counted
-from ..trainers.base import Report
-from ..wearer import STRENGTH, STRENGTHS, Adaptation, correlations
-from ..workers import in_workers
+from .evaluation.folds import EvaluationError, Fold, leave_one_out
+from .evaluation.rates import Rate, RecipeWords, clustered, student
+from .model.collapse import collapse
+from .recogniser import Recogniser
+from .recordings.graspset import GraspSet
+from .samples import Samples, decided
+from .text import counted
+from .trainers.base import Report
+from .wearer import STRENGTH, STRENGTHS, Adaptation, correlations
+from .workers import in_workers
 
 # The number of trials of each type that a person left out is adapted to, and the strength.
 Try = tuple[int, float]
@@ -71,12 +71,18 @@ def chosen_strength(hits: Sequence[Hits], folds: int, seed: int) -> tuple[float,
     """
     if len(hits) < _LEAST_PEOPLE:
         return STRENGTH, []
+    rate = rate_after_adaptation(hits)
+    low, high = round(rate.low, 6), round(rate.high, 6)
+    recognised = Recognised("nested", folds, seed, rate.correct[0], rate.total, rate.of, rate.unit, low, high)
+    return STRENGTHS[_best(hits)], [recognised]
+
+
+def rate_after_adaptation(hits: Sequence[Hits]) -> Rate:
+    """Return the accuracy of people, from the effects of all STRENGTHS: of each with the one that suits the others."""
     totals = [total for _, total in hits]
     correct = [own[best] for best, (own, _) in zip(_chosen_by_others(hits), hits, strict=True)]
-    low, high = (round(end, 6) for end in clustered(correct, totals, "trials"))
-    of: Of = "new subject after adaptation"
-    rate = Recognised("nested", folds, seed, sum(correct), sum(totals), of, "trials", low, high)
-    return STRENGTHS[_best(hits)], [rate]
+    right, total, (low, high) = sum(correct), sum(totals), clustered(correct, totals, "trials")
+    return Rate("new subject after adaptation", "trials", (right,), total, len(hits), right / total, low, high)
 
 
 def _chosen_by_others(hits: Sequence[Hits]) -> list[int]:
