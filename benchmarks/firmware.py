@@ -41,7 +41,7 @@ from thenar.compiler.trainers.base import Model
 from thenar.runtime.code_line import CodeLine
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.model.integers import IntegerTables
-from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.quantise import in_bytes, quantise
 
 ARM = ("cortex-m4", "cortex-m0plus")
 # Begins on reset, before main().
@@ -90,7 +90,7 @@ class Ours:
         """Return the integer tables of a fold."""
         samples = fold.samples(joints=self.joints)
         tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
-        return quantise(tables, samples.switches, samples.codes, 16, self.bits)
+        return in_bytes(quantise(tables, samples.switches, samples.codes, 16, self.bits))
 
     def predictor(self, fold: Fold) -> Predictor:
         """Return the predictor of rows that matches the firmware of a fold."""

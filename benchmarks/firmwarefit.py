@@ -28,6 +28,7 @@ from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.base import Formula
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import COARSE, IntegerTables
+from thenar.runtime.model.quantise import in_bytes
 from thenar.runtime.model.terms.line import Line
 
 FITTED = ("avr328p", "cortex-m0plus", "cortex-m4", "rv32imac")
@@ -89,7 +90,7 @@ def drawn(seed: int) -> IntegerTables:
 
 def measured(name: str, seed: int) -> Point | None:
     """Return the point of a drawn build on a target; None where it does not fit."""
-    target, tables = TARGETS.named(name), drawn(seed)
+    target, tables = TARGETS.named(name), in_bytes(drawn(seed))
     layout = Layout(tables, GROUPS[seed % len(GROUPS)])
     plain = numbered(tables)
     names = replace(plain, grasps=tuple(f"{grasp:.<{NAME_BYTES - 1}}" for grasp in plain.grasps))

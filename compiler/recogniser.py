@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.manifest import Fitting, Rejection
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, MAX_JOINTS, MAX_SWITCHES, IntegerTables, least_bytes
-from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.quantise import in_bytes, quantise
 from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
@@ -181,9 +181,9 @@ class Recogniser:
 
     @cached_property
     def tables(self) -> IntegerTables:
-        """The integer tables, with fitted substitutes for lost inputs."""
+        """The integer tables, with fitted substitutes for lost inputs, as firmware stores them."""
         kept = self._learnt
-        return fit_lost(self.integers, kept.switches, kept.codes, kept.labels)
+        return in_bytes(fit_lost(self.integers, kept.switches, kept.codes, kept.labels))
 
     @cached_property
     def rejection(self) -> Rejection | None:

@@ -16,7 +16,7 @@ from thenar.runtime.hand import HAND_NAME, hand_from_bytes
 from thenar.runtime.manifest import Adapted, Manifest, Of, Recognised, Rejection, Switch, Wearing
 from thenar.runtime.manifest_file import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.model.integers import LIMIT, MAX_BYTES, IntegerTables, tables_to_bytes
-from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.quantise import in_bytes, quantise
 from thenar.runtime.model.tables import winners
 from thenar.runtime.names import list_names, nearest, shortened
 from thenar.runtime.published import NONE
@@ -279,11 +279,8 @@ def _with_substitutes(
         joint_means[joint] += adaptation.with_new((old.joint_means[joint] - contribution / len(codes)) * ratio, shares)
         joint_means[joint] = np.clip(joint_means[joint], possible.min(axis=0), possible.max(axis=0))
     switch_means = np.clip(switch_means, np.minimum(rows, 0), np.maximum(rows, 0))
-    return replace(
-        made,
-        switch_means=np.rint(switch_means).astype(np.int16),
-        joint_means=np.rint(joint_means).astype(np.int16),
-    )
+    switch_means, joint_means = (np.rint(means).astype(np.int16) for means in (switch_means, joint_means))
+    return in_bytes(replace(made, switch_means=switch_means, joint_means=joint_means))
 
 
 def _wider(

@@ -62,7 +62,8 @@ def table_bytes(layout: Layout, *, avr: bool) -> int:
 
     Straight-line code takes the place of tables; the linker then leaves out a part of the core.
     """
-    tables, means = layout.tables, 2 * layout.means.size
+    tables = layout.tables
+    means = (tables.n_switches + tables.n_joints) * (tables.n_classes + 1)
     if avr and (function := straight(layout)) is not None:
         return means + 2 * len(function.instructions) - CORE_SUM
     bins, lines = len(layout.binned), len(tables.lines)

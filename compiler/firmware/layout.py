@@ -139,14 +139,12 @@ class Layout:
 
     @property
     def means(self) -> Rows:
-        """What each missing input adds to an open switch, or to code 0 of a joint, (s + j, K): switches first."""
-        tables = self.tables
-        joints = [
-            mean - rows[0] for mean, rows in zip(tables.joint_means.astype(np.int64), tables.joint_rows, strict=True)
-        ]
-        for line in tables.lines:
-            joints[line.joint] = joints[line.joint] - line.of(np.zeros(1, np.uint16))[0]
-        return np.vstack([tables.switch_means.astype(np.int64), *joints])
+        """Rows (1 + K,): the binary logarithm of a step, and what each input adds in steps if it is missing."""
+        missing, shifts = self.tables.missing, self.tables.missing_shifts[:, np.newaxis]
+        means = missing >> shifts
+        if (means << shifts != missing).any():
+            raise FirmwareError("the means of missing inputs are finer than bytes: round them by quantise.in_bytes")
+        return np.hstack([shifts, means])
 
     @property
     def frame_size(self) -> int:

@@ -197,17 +197,17 @@ static void add(thenar *hand, const uint16_t *end)
 /* Missing inputs were added as open, or as code 0: add the difference to their means. */
 static void add_means(thenar *hand)
 {
-    const int16_t *mean = hand->model->means;
+    const int8_t *mean = hand->model->means;
 
     for (uint16_t input = 0u; input < (hand->model->switches + hand->model->joints); input++) {
         const bool lost = bit_of(hand->lost, input);
+        const uint8_t shift = (uint8_t)THENAR_READ_8(mean);
 
-        for (uint16_t k = 0u; k < hand->model->classes; k++) {
-            if (lost) {
-                hand->scores[k] = (int16_t)(uint16_t)((uint16_t)hand->scores[k] + (uint16_t)THENAR_READ_16(mean));
-            }
-            mean++;
+        for (uint16_t k = 0u; lost && (k < hand->model->classes); k++) {
+            hand->scores[k] = (int16_t)(uint16_t)((uint16_t)hand->scores[k]
+                + ((uint16_t)(int8_t)THENAR_READ_8(&mean[k + 1u]) << shift));
         }
+        mean += hand->model->classes + 1u;
     }
 }
 

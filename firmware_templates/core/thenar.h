@@ -112,7 +112,8 @@ typedef struct {
     const thenar_line *lines;
     const thenar_grid *grids;
     const uint16_t *thresholds;
-    const int16_t *means;           /* [switches + joints][classes]: what a missing input adds to open, or to code 0 */
+    const int8_t *means;            /* [switches + joints][1 + classes]: a shift, and what a missing input adds to open,
+                                       or to code 0, before that */
     const char *names;              /* each with its end */
     const thenar_rejection *rejection;
 } thenar_model;

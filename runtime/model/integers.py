@@ -83,7 +83,8 @@ class IntegerTables(Additive):
 
     bias (K,); terms: a `Bit` for each switch, `Bins` for each joint, and a `Line` for some joints, or a `Grid` for
     some pairs of joints, each joint in one at most, in the order of the (first) joints. switch_means (s, K) and
-    joint_means (j, K) replace missing inputs; scale in steps per unit of score.
+    joint_means (j, K) replace missing inputs; scale in steps per unit of score. Firmware stores means in bytes:
+    `quantise.in_bytes` rounds them.
 
     grid is 1, or 256 for tables with slopes whose rows of switches and bins were rounded to multiples of 256 steps, and
     whose scores are relative to the last class.
@@ -189,6 +190,20 @@ class IntegerTables(Additive):
         codes = np.append(0, thresholds + 1)
         rows = sum((slope.of(codes) for slope in slopes), bins.of(codes)).astype(np.int16)
         return Bins(joint, thresholds.astype(np.uint16), rows)
+
+    @property
+    def missing(self) -> Steps:
+        """What each missing input adds to an open switch, or to code 0 of a joint, (s + j, K): switches first."""
+        joints = self.joint_means.astype(np.int64)
+        for number in range(self.n_joints):
+            joints[number] -= sum(term.of(np.zeros(1, np.uint16))[0].astype(np.int64) for term in self.of_joint(number))
+        return np.vstack([self.switch_means.astype(np.int64), joints])
+
+    @property
+    def missing_shifts(self) -> Steps:
+        """The binary logarithms of the finest steps in which bytes hold each row of `missing`, rounded, (s + j,)."""
+        most = np.abs(self.missing).max(axis=1).tolist()
+        return np.array([max(0, number.bit_length() - 7) for number in most], np.int64)
 
     def joint_sums(self, codes: NDArray[np.uint16]) -> NDArray[np.int32]:
         """Return the bias plus the contribution of the joints' codes (n, j), (n, K)."""

@@ -172,6 +172,25 @@ def quantise(
     )
 
 
+def in_bytes(tables: IntegerTables) -> IntegerTables:
+    """Return tables with means of missing inputs that firmware stores in bytes, each row in steps of a power of two.
+
+    Each is the nearest one that is not beyond what its input can add, so no sum leaves its bounds.
+    """
+    s, shift, rows = tables.n_switches, tables.missing_shifts[:, np.newaxis], tables.switch_rows
+    missing = tables.missing
+    zero = np.vstack([tables.switch_means, tables.joint_means]) - missing
+    possible = [np.stack([0 * row, row]).astype(np.int64) for row in rows]
+    possible += [tables.choices(joint)[1] for joint in range(tables.n_joints)]
+    ends = (np.array([end(each, axis=0) for each in possible], np.int64) for end in (np.min, np.max))
+    least, most = (end.reshape(zero.shape) - zero for end in ends)
+    steps = np.rint(missing / 2**shift).astype(np.int64)
+    # Shifts round down.
+    steps = np.clip(steps, np.maximum(-(-least >> shift), -127), np.minimum(most >> shift, 127))
+    means = (zero + (steps << shift)).astype(np.int16)
+    return replace(tables, switch_means=means[:s], joint_means=means[s:])
+
+
 def _mean(rows: NDArray[Any]) -> Floats:
     """Return the mean (K,) of rows (n, K), summed exactly, so that its bits are the same on every machine."""
     return np.array([math.fsum(column) / len(rows) for column in rows.T])

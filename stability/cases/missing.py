@@ -15,7 +15,7 @@ from ..finding import Finding
 from ..inputs.hard_tables import Bits, Codes
 from ..inputs.small_sets import SmallBuild, small_build, small_set
 from ..reference.numbers import precisely
-from ..reference.standing_in import Kind, stand_ins
+from ..reference.standing_in import Kind, in_bytes, stand_ins
 from ..reference.tables import balanced, mean_row
 
 
@@ -76,10 +76,12 @@ def _fitted(small: SmallBuild) -> Finding:
         [mean_row(*joint) for joint in of_joints],
     )
     got = integers.switch_means.tolist(), integers.joint_means.tolist()
-    for what, kind, of_kind, rows in zip(("switch", "joint"), _kinds(small), means, got, strict=True):
+    zeros = (0 * integers.switch_rows).tolist(), [rows[0].tolist() for rows in integers.joint_rows]
+    for what, kind, of_kind, zero, rows in zip(("switch", "joint"), _kinds(small), means, zeros, got, strict=True):
         with precisely():
             in_steps = [[value * integers.scale for value in row] for row in of_kind]
-        for number, (one, other) in enumerate(zip(stand_ins(kind, in_steps), rows, strict=True)):
+        held = map(in_bytes, stand_ins(kind, in_steps), zero, kind.ends)
+        for number, (one, other) in enumerate(zip(held, rows, strict=True)):
             worst.see(max(abs(a - b) for a, b in zip(one, other, strict=True)), f"{what} {number}")
     return worst
 

@@ -65,6 +65,16 @@ def stand_ins(kind: Kind, means: Sequence[Sequence[float]]) -> list[list[int]]:
     return rows
 
 
+def in_bytes(row: Row, zero: Row, ends: tuple[Row, Row]) -> list[int]:
+    """Return the nearest row (K,) that bytes hold: at most 127 equal powers of two from `zero`, within `ends`."""
+    unit = 1 << max(0, max(abs(x - of_zero) for x, of_zero in zip(row, zero, strict=True)).bit_length() - 7)
+    held = []
+    for x, of_zero, low, high in zip(row, zero, *ends, strict=True):
+        steps = max(int(mpmath.nint(mpf(x - of_zero) / unit)), -127, -((of_zero - low) // unit))
+        held.append(of_zero + unit * min(steps, 127, (high - of_zero) // unit))
+    return held
+
+
 def _lack(kind: Kind, shares: Sequence[Sequence[mpf]], row: Row) -> list[mpf]:
     """Return the steps (K,) that each class lacks if all scores, of powers `shares` (n, K), gain this row."""
     powers = [mpmath.exp(step / mpf(kind.scale)) for step in row]

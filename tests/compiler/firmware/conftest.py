@@ -13,6 +13,7 @@ from thenar.compiler.firmware.softmax import Softmax
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import in_bytes
 from thenar.runtime.scores import LANE_OFFSET
 
 from ...conftest import tool
@@ -37,7 +38,7 @@ def make_tables(
     def thresholds() -> np.ndarray:
         return np.sort(np.append(random.choice(highest, bins - 2, replace=False), highest)).astype(np.uint16)
 
-    return IntegerTables.of(
+    tables = IntegerTables.of(
         bias=rows(classes),
         switch_rows=rows(switches, classes),
         thresholds=tuple(thresholds() for _ in range(joints)),
@@ -46,6 +47,7 @@ def make_tables(
         joint_means=rows(joints, classes),
         scale=100.0,
     )
+    return in_bytes(tables)
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.compiler.firmware.tools import STRICT, call, workshop
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.model.integers import COARSE, IntegerTables
+from thenar.runtime.model.quantise import in_bytes
 from thenar.runtime.model.terms.grid import Grid
 from thenar.runtime.model.terms.line import Line
 
@@ -87,7 +88,7 @@ def made(
         each[: 0 if joint in constant or joint >= joints - lines + 1 else None]
         for joint, each in enumerate(tables.thresholds)
     ]
-    return tables.changed(
+    shaped = tables.changed(
         bias=rows(tables.bias),
         switch_rows=rows(tables.switch_rows),
         switch_means=rows(tables.switch_means),
@@ -100,6 +101,7 @@ def made(
         ],
         grid=unit,
     )
+    return in_bytes(shaped)
 
 
 def _line(random: np.random.Generator, joint: int, last: np.ndarray, top: int, share: int) -> Line:
@@ -257,7 +259,7 @@ int main(void)
 
 
 def test_hands_share_nothing_and_unknown_numbers_do_nothing() -> None:
-    tables = make_tables(switches=33, joints=3)
+    tables = make_tables(1, switches=33, joints=3)
     names = replace(numbered(tables), grasps=('say "Ü"\\n??/', "abc", "", "12", "three"))
     sanitized = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     with workshop(Library("hand", names, Layout(tables)).files | {"main.c": PROGRAM}) as folder:

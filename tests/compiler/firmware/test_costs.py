@@ -54,7 +54,7 @@ def wide_tables() -> IntegerTables:
 
 
 def test_switches_share_look_ups_where_there_is_flash_for_it(tables: IntegerTables) -> None:
-    small, wide = make_tables(switches=8, joints=0), make_tables(classes=30, switches=48, joints=0)
+    small, wide = make_tables(switches=8, joints=0), make_tables(classes=30, switches=64, joints=0)
     assert [fit_for(SMALL, each).layout.group for each in (small, tables, wide)] == [4, 4, 1]
     assert fit_for(TARGETS["avr2560"], tables).layout.group == 4
     assert fit_for(TARGETS["host"], tables).layout.group == 4

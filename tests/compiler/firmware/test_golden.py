@@ -21,6 +21,7 @@ from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Origin, Proof, Switch
 from thenar.runtime.model.integers import IntegerTables
+from thenar.runtime.model.quantise import in_bytes
 from thenar.runtime.recipe import Recipe
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "firmware"
@@ -52,7 +53,7 @@ CASES = ("host", "avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "rv32imac",
 
 
 def small_build() -> Build:
-    tables = IntegerTables.of(
+    exact = IntegerTables.of(
         bias=np.array([120, -40, 7], np.int16),
         switch_rows=np.array(
             [[310, 205, -80], [-45, 260, 33], [90, -12, -7], [150, -300, 41], [400, -390, -120], [77, -8, 260]],
@@ -67,6 +68,7 @@ def small_build() -> Build:
         joint_means=np.array([[1, 2, 3], [4, 5, 6]], np.int16),
         scale=100.0,
     )
+    tables = in_bytes(exact)
     manifest = Manifest(
         schema=SCHEMA,
         checksum="",

@@ -8,7 +8,7 @@ from thenar.compiler.model.collapse import collapse
 from thenar.compiler.model.faults import _lack, fit_lost
 from thenar.compiler.trainers.stumps import Stumps
 from thenar.runtime.model.integers import IntegerTables
-from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.quantise import in_bytes, quantise
 
 from .conftest import make_stumps
 
@@ -97,3 +97,25 @@ def test_inputs_that_add_nothing_change_nothing_for_the_others(seed: int) -> Non
     again = fit_lost(more, np.hstack([silent > 0, bits]), np.hstack([codes, silent.astype(np.uint16)]), labels)
     assert np.array_equal(again.switch_means, np.vstack([none, fitted.switch_means]))
     assert np.array_equal(again.joint_means, np.vstack([fitted.joint_means, constant]))
+
+
+@given(seed=st.integers(0, 1000), reach=st.sampled_from([1, 90, 800]), joints=st.integers(0, 3))
+def test_bytes_hold_means_that_are_the_nearest_within_what_the_input_adds(seed: int, reach: int, joints: int) -> None:
+    stumps = make_stumps(seed, rounds=1 + reach // 8, classes=K, switches=SWITCHES, joints=joints)
+    before, fitted = _both(stumps, _rows(seed, 60, joints))
+    after, units = in_bytes(fitted), 1 << fitted.missing_shifts
+    steps, rest = np.divmod(after.missing, units[:, np.newaxis])
+    assert not rest.any()
+    assert np.abs(steps).max() <= 127
+    assert np.all(after.missing_shifts <= fitted.missing_shifts)
+    possible = [np.stack([0 * row, row]).astype(np.int64) for row in fitted.switch_rows]
+    possible += [fitted.choices(joint)[1] for joint in range(joints)]
+    zeros = [row[0] for row in possible]
+    for row, zero, unit, mean, short in zip(possible, zeros, units, fitted.missing, after.missing, strict=True):
+        allowed = np.arange(-127, 128)[:, np.newaxis] * unit
+        inside = (row.min(axis=0) - zero <= allowed) & (allowed <= row.max(axis=0) - zero)
+        apart = np.where(inside, np.abs(allowed - mean), 1 << 20)
+        assert np.array_equal(np.abs(short - mean), apart.min(axis=0))
+    again = in_bytes(after)
+    assert np.array_equal(again.missing, after.missing)
+    assert after.bound == before.bound

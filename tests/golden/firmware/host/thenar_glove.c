@@ -54,15 +54,15 @@ static const uint16_t thresholds[] THENAR_FLASH = {
     60u, 61u, 140u, 90u, 200u, 65535u,
 };
 
-static const int16_t means[] THENAR_FLASH = {
-    155, 102, -40,
-    155, 102, -40,
-    155, 102, -40,
-    155, 102, -40,
-    155, 102, -40,
-    155, 102, -40,
-    201, -178, -87,
-    314, -35, -214,
+static const int8_t means[] THENAR_FLASH = {
+    1, 78, 51, -20,
+    0, 0, 102, 0,
+    0, 90, 0, -6,
+    1, 75, 0, 0,
+    1, 78, 0, -20,
+    0, 76, 0, 0,
+    1, 100, -89, -44,
+    2, 78, -9, -54,
 };
 
 static const char names[] THENAR_FLASH =
