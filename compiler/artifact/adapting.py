@@ -279,8 +279,12 @@ def _with_substitutes(
         joint_means[joint] += adaptation.with_new((old.joint_means[joint] - contribution / len(codes)) * ratio, shares)
         joint_means[joint] = np.clip(joint_means[joint], possible.min(axis=0), possible.max(axis=0))
     switch_means = np.clip(switch_means, np.minimum(rows, 0), np.maximum(rows, 0))
-    switch_means, joint_means = (np.rint(means).astype(np.int16) for means in (switch_means, joint_means))
-    return in_bytes(replace(made, switch_means=switch_means, joint_means=joint_means))
+    found = replace(
+        made,
+        switch_means=np.rint(switch_means).astype(np.int16),
+        joint_means=np.rint(joint_means).astype(np.int16),
+    )
+    return in_bytes(found)
 
 
 def _wider(
