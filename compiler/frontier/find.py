@@ -141,7 +141,10 @@ def find_frontier(
         raise FrontierError("``have``, ``never`` and ``prices`` are for ``sensors`` or ``price``: add one of these")
     cuts = Cuts.of(samples, search)
     if own and not cuts.subjects:
-        raise FrontierError("own trials are of a new subject, who is left out: record two or more subjects")
+        raise FrontierError("own trials are those of a subject who is left out: record two or more subjects")
+    types = samples.labels[np.unique(cuts.trials, return_index=True)[1]]
+    if own >= np.unique([*zip(cuts.people.tolist(), types.tolist(), strict=True)], axis=0, return_counts=True)[1].max():
+        raise FrontierError(f"nobody has more than {own} trials of a type: adapt to fewer")
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:

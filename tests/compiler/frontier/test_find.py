@@ -194,9 +194,10 @@ def test_points_after_own_trials_are_those_that_evaluate_finds(tmp_path: Path) -
         # All of the three have as many trials.
         assert point.adapted.mean == pytest.approx(fmean(row.people))
         assert (point.adapted.over, point.adapted.total) == (3, 96 - 3 * 4 * 2)
-    with pytest.raises(FrontierError, match="record two or more subjects"):
-        found_of(request | {"grasp_set": make_set(), "output": tmp_path / "alone"})
-    assert not (tmp_path / "alone").exists()
+    for wrong in ({"grasp_set": make_set()}, {"own": 8}):
+        with pytest.raises(FrontierError, match=r"record two or more subjects|nobody has more than 8 trials of a type"):
+            found_of(request | wrong | {"output": tmp_path / "refused"})
+    assert not (tmp_path / "refused").exists()
 
 
 def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path) -> None:
