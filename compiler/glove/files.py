@@ -20,7 +20,6 @@ from ..publication import check_folder, entries, publish_folder
 from ..text import cells, sentence
 from .circuit import BillLine, Circuit, Component, ComponentKind
 from .layout import CONTACT_MM, counted_sensors
-from .pattern import svg_of
 from .prices import Part
 from .spec import GloveSpec, SpecSummary, glove_spec
 
@@ -264,7 +263,7 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
     }
     if spec.pattern is None:
         return files
-    return {**files, "cutting.svg": svg_of(spec.pattern)}
+    return {**files, "cutting.svg": spec.pattern[1]}
 
 
 def check_output(folder: Path) -> None:
