@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.model.tables import ScoreTables
-from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.model.terms.line import Line
 
 from ..elementary import Floats
@@ -29,7 +28,7 @@ _FEWER = 3.0  # the pull on the weights that remain is smaller by this factor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColumnTables:
-    """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of any numbers.
+    """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of bits or codes.
 
     bias   (K,)
     edges  for each column, ascending (B - 1,): the bin of x is the number of edges below it
@@ -48,15 +47,10 @@ class ColumnTables:
         for column in range(n_switches):
             opened, closed = self.rows[column][np.searchsorted(self.edges[column], [0.0, 1.0])]
             bias, switch_rows[column] = bias + opened, closed - opened
-        thresholds, joint_rows = [], []
-        for edges, rows in zip(self.edges[n_switches:], self.rows[n_switches:], strict=True):
-            floors = np.unique(np.floor(edges))
-            steps = floors[(floors >= 0) & (floors < HIGHEST_CODE)]
-            thresholds.append(steps.astype(np.uint16))
-            # The smallest code of each bin.
-            joint_rows.append(rows[np.searchsorted(edges, np.append(0.0, steps + 1))])
+        # An edge lies between two codes, and a threshold is the last code of a bin.
+        thresholds = [np.floor(edges).astype(np.uint16) for edges in self.edges[n_switches:]]
         lines = (Line(column - n_switches, int(low), int(high), row) for column, (low, high, row) in self.lines.items())
-        return ScoreTables.of(bias, switch_rows, thresholds, joint_rows, [*lines])
+        return ScoreTables.of(bias, switch_rows, thresholds, self.rows[n_switches:], [*lines])
 
 
 def fit_logit(

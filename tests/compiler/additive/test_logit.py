@@ -133,10 +133,11 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
     fitted = fit_logit(X, labels, 3, linear=linear)
     found = fitted.score_tables(6).scores(X[:, :6].astype(bool), X[:, 6:].astype(np.uint16))
     np.testing.assert_allclose(found, scores_of(fitted, X), rtol=0, atol=1e-12)
-    # Edges between numbers that are no codes, and below all codes.
-    odd = ColumnTables(np.zeros(2), (np.array([-3.5, 1.2, 1.7, 4.0]),), (np.arange(10.0).reshape(5, 2),))
-    codes = np.arange(7, dtype=np.uint16)[:, np.newaxis]
-    assert np.array_equal(odd.score_tables(0).scores(np.zeros((7, 0), bool), codes), scores_of(odd, codes))
+    # Codes next to each other, at both ends of their range.
+    ends = np.array([0, 1, 2, 65533, 65534, 65535] * 3, np.uint16)[:, np.newaxis]
+    fitted = fit_logit(ends, np.arange(18) % 3, 3, max_bins=None, linear=linear)
+    found = fitted.score_tables(0).scores(np.zeros((18, 0), bool), ends)
+    np.testing.assert_allclose(found, scores_of(fitted, ends), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,9 @@ import pytest
 
 from thenar.compiler import adapt, compile_build
 from thenar.compiler.artifact.documents import Documents, report_of_build
-from thenar.compiler.pictures import PALETTE, embedded
+from thenar.compiler.pictures import PALETTE
 from thenar.compiler.report import tryout
+from thenar.compiler.report.page import embedded
 from thenar.compiler.report.tryout import MOST_BYTES, sample, scoped
 
 from ..conftest import make_set, with_none
