@@ -51,7 +51,7 @@ def fit_discriminant(
     max_bins: int | None = None,
     calibrated: bool = True,
 ) -> ColumnTables:
-    """Fit X (n, d) finite numbers, labels (n,) in 0..n_classes-1 and trials (n,).
+    """Fit X (n, d) bits and integer codes, labels (n,) in 0..n_classes-1 and trials (n,).
 
     Columns of more than two values add scores in proportion to them, between minimum and maximum, and rows of at most
     `max_bins` bins that hold rows as evenly as possible; None: no rows. Unless `calibrated`, scores keep the size that

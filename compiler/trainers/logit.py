@@ -67,7 +67,7 @@ def fit_logit(
     counted: int = 0,
     held: NDArray[np.bool_] | None = None,
 ) -> ColumnTables:
-    """Fit X (n, d) finite numbers and labels (n,) in 0..n_classes-1.
+    """Fit X (n, d) bits and integer codes, and labels (n,) in 0..n_classes-1.
 
     `penalty` pulls rows towards zero, `smoothness` pulls those of neighbouring bins towards each other. Columns have at
     most `max_bins` bins (2 or more; None: one for each value) that hold frames as evenly as possible. With `linear` a
