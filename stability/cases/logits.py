@@ -67,7 +67,7 @@ def _fits(full: bool) -> Iterator[tuple[HardSet, tuple[float, float], bool]]:
     yield separable(1000 if full else 60, 1), USUAL, True
     for pulls in (USUAL, TINY, HUGE):
         yield noisy(5, 40, 0.5, seed=3), pulls, False
-        for counts in ([[10**4, 1], [1, 1]], [[10**4, 0, 1], [1, 10**4, 0], [0, 1, 10**2]]):
+        for counts in ([[10**6 if full else 10**4, 1], [1, 1]], [[10**4, 0, 1], [1, 10**4, 0], [0, 1, 10**2]]):
             hard = contradictory(counts)
             rows = np.repeat(np.arange(len(hard.X)), hard.row_weights.astype(int))
             yield replace(hard.rows(rows), weights=None), pulls, False
