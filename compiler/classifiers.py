@@ -1,6 +1,6 @@
 """The paper's trainer as a scikit-learn estimator: LogitBoost on decision stumps."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -82,13 +82,7 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         self.max_bins = max_bins
         self.classes = classes
 
-    def fit(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        sample_weight: ArrayLike | None = None,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
         """Train on X (n, d) and labels y (n,).
 
         Parameters
@@ -99,8 +93,6 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
             Labels.
         sample_weight : array-like, shape (n,), optional
             The weight of each row; 0 removes it.
-        progress : callable, optional
-            Called with (done, total) after every round.
 
         Returns
         -------
@@ -135,7 +127,6 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
             tolerance=self.tolerance,
             weights=weights,
             max_bins=self.max_bins,
-            on_round=progress,
         )
         self.n_rounds_ = self.stumps_.n_rounds
         self.losses_ = np.array(losses)

@@ -67,7 +67,7 @@ class HandShape:
     names, places (s, 2)  the switches and their centres; radius_mm of the circle that represents one
     parts (s,)            index of each switch's part in part_names: the digits from the thumb on, then the palm
     sides (s,)            -1 on the unfolded left side of its digit, 1 on the right one, 0 elsewhere
-    outline (k, 2)        the hand from cuff to cuff; digits: outline of each digit; creases: open lines
+    outline (k, 2)        the hand from cuff to cuff; creases: open lines
     strips                outlines of the unfolded sides, left and right of the thumb, then of the index, ...
     labels (digits, 2)    where a digit's name is written, above its tip
     part_number           of a switch to buy, and body_mm, its width; "" and 0 if open
@@ -82,7 +82,6 @@ class HandShape:
     parts: NDArray[np.intp]
     sides: NDArray[np.intp]
     outline: Floats
-    digits: tuple[Floats, ...]
     strips: tuple[Floats, ...]
     creases: tuple[Floats, ...]
     labels: Floats
@@ -122,7 +121,6 @@ class HandShape:
             length_mm=length_mm,
             places=self.places * factor,
             outline=self.outline * factor,
-            digits=tuple(digit * factor for digit in self.digits),
             strips=tuple(strip * factor for strip in self.strips),
             creases=tuple(crease * factor for crease in self.creases),
             labels=self.labels * factor,
@@ -206,7 +204,6 @@ def load_layout(path: Path) -> HandShape:
         parts=np.array([part_names.index(part) for part in parts], np.intp),
         sides=np.zeros(len(names), np.intp),
         outline=np.array(layout.outline, np.float64).reshape(-1, 2),
-        digits=(),
         strips=(),
         creases=(),
         labels=np.empty((0, 2)),

@@ -1,11 +1,7 @@
-"""Common parts of pictures and pages.
-
-One palette; for pictures, names that are not parsed as formulas, equal bytes, optional matplotlib; for pages of one
-file, their templates, the data in their scripts, and the hashes that their policy allows.
+"""Common parts of pictures: one palette, also of pages; names that are not parsed as formulas, labels next to their
+places, equal bytes, optional matplotlib.
 """
 
-import base64
-import hashlib
 import io
 import re
 import warnings
@@ -18,15 +14,12 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any
 
-import msgspec
 import numpy as np
 
-from thenar.drivers.extras import missing, optional
+from thenar.drivers.extras import missing
 from thenar.runtime.errors import ThenarError
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
-    from markupsafe import Markup
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -178,32 +171,3 @@ def around(axes: "Axes", x: float, y: float) -> Box:
 
 def _meet(one: Box, other: Box) -> bool:
     return one[0] <= other[2] and other[0] <= one[2] and one[1] <= other[3] and other[1] <= one[3]
-
-
-def templates(package: str, folder: str) -> "Environment":
-    """Return the environment of the templates in a package's folder."""
-    with optional():
-        from jinja2 import Environment, PackageLoader, StrictUndefined
-    return Environment(
-        loader=PackageLoader(package, folder),
-        undefined=StrictUndefined,
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-
-
-def embedded(data: object) -> "Markup":
-    """Return JSON for a script element: whatever a name contains, it begins or ends no tag and is no entity."""
-    from markupsafe import Markup
-
-    text = msgspec.json.encode(data).decode()
-    for letter in "<>&":
-        text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return Markup(text)
-
-
-def policy_hash(text: str) -> str:
-    """Return the SHA-256 by which a page's policy allows a script or a style."""
-    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

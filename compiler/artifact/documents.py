@@ -21,8 +21,6 @@ from ..model.compare import Comparison, worst_case
 from ..model.faults import FaultCounts
 from ..recogniser import Recogniser
 from ..recordings.graspset import GraspSet
-from ..samples import select_inputs
-from .verify import labels_of
 
 if TYPE_CHECKING:
     from ..frontier.points import Frontier
@@ -170,35 +168,17 @@ def _transitions(grasp_set: GraspSet) -> "Transitions | None":
         return None
 
 
-def report_of_build(folder: str | Path, grasp_set: GraspSet | None = None) -> bytes:
+def report_of_build(folder: str | Path) -> bytes:
     """Return the page of the build in `folder`: its `report.html`, or else one made of what the folder states.
 
-    Parameters
-    ----------
-    folder : path
-        The build.
-    grasp_set : GraspSet, optional
-        Recordings with its inputs: some of their rows go into a page that is made.
-
-    Raises
-    ------
-    BuildError, FormatError
-        If the folder is not a valid build.
-    CompileError
-        If the recordings lack inputs of the build.
+    Raises BuildError or FormatError if the folder is not a valid build.
     """
     where = Path(folder)
     build = Build.load(where)
     if (where / REPORT_NAME).is_file():
         return (where / REPORT_NAME).read_bytes()
-    manifest = build.manifest
-    if grasp_set is None:
-        bits, codes = np.zeros((0, len(manifest.switches)), bool), np.zeros((0, len(manifest.joints)), np.uint16)
-        labels = np.zeros(0, np.intp)
-    else:
-        labels = labels_of(np.array(build.grasps), grasp_set)
-        bits, codes = select_inputs(grasp_set, manifest)
-    return stated_report(build, load_hand(where, manifest), bits, codes, labels)
+    bits, codes = np.zeros((0, build.tables.n_switches), bool), np.zeros((0, build.tables.n_joints), np.uint16)
+    return stated_report(build, load_hand(where, build.manifest), bits, codes, np.zeros(0, np.intp))
 
 
 def stated_report(

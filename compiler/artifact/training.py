@@ -3,7 +3,7 @@ build was trained on.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -136,43 +136,6 @@ def scores_of(
     return recogniser.scores(tested), hits_of(recogniser, tested)
 
 
-def cross_validated(
-    samples: Samples, cuts: Sequence[Cut], options: Recipe, test: Test, jobs: int, report: Report | None
-) -> Tested | None:
-    """Return the result of the folds, None without folds; `test` tests a fold.
-
-    jobs  worker processes that call `test`; report: called with (done, total) after each fold
-    """
-    if not cuts:
-        return None
-    folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
-    classes = np.empty((len(cuts), len(samples.labels)), np.intp)
-    scores = np.empty((len(samples.labels), samples.n_classes))
-    knows = [trained_with_rest(samples, cut) for cut in cuts]
-    # Segments are learned from folds that know rows in which nothing is held, if there are any.
-    scored = next((place for place, rows in enumerate(knows) if rows.all()), 0)
-    tasks = ((place, fold, test) for place, fold in folds)
-    adapted = list[Hits]()
-    for done, (place, fold, (fold_scores, hits)) in enumerate(
-        in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
-    ):
-        classes[place, fold.test] = fold_scores.argmax(axis=1)
-        adapted += hits
-        if place == scored:
-            scores[fold.test] = fold_scores[:, : samples.n_classes]
-        if report is not None:
-            report(done, len(folds))
-    refuses = not samples.has_none and bool((classes == samples.n_classes).any())
-    confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
-    np.add.at(confusion, (samples.labels[knows[0]], classes[0, knows[0]]), 1)
-    rates, detection = list[Recognised](), list[Detected]()
-    for cut, predicted in zip(cuts, classes, strict=True):
-        rates += rates_of("nested", samples, predicted, options.seed, cut)
-        detection += detection_of("nested", samples, predicted, options.seed, cut)
-    strength, adapted_rates = chosen_strength(adapted, len(cuts[0].folds), options.seed)
-    return Tested((*rates, *adapted_rates), tuple(detection), confusion, scores, strength)
-
-
 def fold_results(
     grasp_set: GraspSet,
     samples: Samples,
@@ -188,8 +151,34 @@ def fold_results(
 
     Raises CompileError or EvaluationError for recordings that do not allow it.
     """
-    test = partial(scores_of, samples, recipe, ports, groups_for(grasp_set, recipe), limits)
-    return cross_validated(samples, cuts_of(grasp_set, recipe), recipe, test, jobs, report)
+    cuts = cuts_of(grasp_set, recipe)
+    if not cuts:
+        return None
+    tasks = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
+    test = partial(_done, partial(scores_of, samples, recipe, ports, groups_for(grasp_set, recipe), limits))
+    classes = np.empty((len(cuts), len(samples.labels)), np.intp)
+    scores = np.empty((len(samples.labels), samples.n_classes))
+    knows = [trained_with_rest(samples, cut) for cut in cuts]
+    # Segments are learned from folds that know rows in which nothing is held, if there are any.
+    scored = next((place for place, rows in enumerate(knows) if rows.all()), 0)
+    jobs = little(len(tasks) * len(samples.labels) * (recipe.rounds or USUAL_ROUNDS), jobs)
+    adapted = list[Hits]()
+    for done, (place, fold, (fold_scores, hits)) in enumerate(in_workers(test, tasks, jobs), 1):
+        classes[place, fold.test] = fold_scores.argmax(axis=1)
+        adapted += hits
+        if place == scored:
+            scores[fold.test] = fold_scores[:, : samples.n_classes]
+        if report is not None:
+            report(done, len(tasks))
+    refuses = not samples.has_none and bool((classes == samples.n_classes).any())
+    confusion = np.zeros((samples.n_classes + refuses,) * 2, dtype=np.intp)
+    np.add.at(confusion, (samples.labels[knows[0]], classes[0, knows[0]]), 1)
+    rates, detection = list[Recognised](), list[Detected]()
+    for cut, predicted in zip(cuts, classes, strict=True):
+        rates += rates_of("nested", samples, predicted, recipe.seed, cut)
+        detection += detection_of("nested", samples, predicted, recipe.seed, cut)
+    strength, adapted_rates = chosen_strength(adapted, len(cuts[0].folds), recipe.seed)
+    return Tested((*rates, *adapted_rates), tuple(detection), confusion, scores, strength)
 
 
 def trained_with_rest(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
@@ -204,8 +193,8 @@ def trained_with_rest(samples: Samples, cut: "Cut") -> NDArray[np.bool_]:
     return mask
 
 
-def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, tuple[Scores, list[Hits]]]:
-    place, fold, test = task
+def _done(test: Test, task: tuple[int, Fold]) -> tuple[int, Fold, tuple[Scores, list[Hits]]]:
+    place, fold = task
     return place, fold, test(fold)
 
 

@@ -17,17 +17,14 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
-from ..text import cells, sentence
+from ..text import cells
 from .circuit import BillLine, Circuit, Component, ComponentKind
 from .layout import CONTACT_MM, counted_sensors
-from .pattern import svg_of
 from .prices import Part
 from .spec import GloveSpec, SpecSummary, glove_spec
 
 Row = Sequence[object]
 _WIDTH = 100
-# Topics of facts that say what to expect of the glove.
-_EXPECTED = ("scan", "accuracy", "caution", "faults")
 # Of the netlist.
 _VERSION = "E"
 # An arbitrary constant: identifiers must only be the same whenever the same component is written.
@@ -92,7 +89,7 @@ def readme_of(spec: GloveSpec) -> str:
     """Return the text of README.txt."""
     summary = spec.summary
     parts = [f"{summary.glove}: a glove with {summary.kept}", *_building(summary)]
-    parts += ["What to expect", *expectations(spec)]
+    parts += ["What to expect", *summary.expected]
     doubts = [f"{m.part or m.what}: {m.note}" for m in summary.materials if not m.sure]
     parts += [
         "Please note",
@@ -104,11 +101,6 @@ def readme_of(spec: GloveSpec) -> str:
     headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "Please note"}
     laid_out = (f"{part}\n{'-' * len(part)}\n" if part in headings else fill(part, _WIDTH) + "\n" for part in parts)
     return "\n".join(laid_out)
-
-
-def expectations(spec: GloveSpec) -> Iterator[str]:
-    """Yield sentences on times and accuracy."""
-    return (sentence(str(fact)) for fact in spec.facts if fact.topic in _EXPECTED)
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:
@@ -264,7 +256,7 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
     }
     if spec.pattern is None:
         return files
-    return {**files, "cutting.svg": svg_of(spec.pattern)}
+    return {**files, "cutting.svg": spec.pattern[1]}
 
 
 def check_output(folder: Path) -> None:

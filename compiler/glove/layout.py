@@ -249,7 +249,7 @@ def wires_of(
     made: list[GloveWire] = []
     connectors = 0
     for bundle in order:
-        wires = [*_signals(bundle, bundles[bundle], switches, home), *_returns(bundle, bundles[bundle], switches, home)]
+        wires = list(_wires(bundle, bundles[bundle], switches, home))
         for start in range(0, len(wires), _LONGEST_HEADER):
             connectors += 1
             group = wires[start : start + _LONGEST_HEADER]
@@ -271,34 +271,20 @@ def net_of(end: WireEnd, switch: PlacedSensor) -> str:
     return f"{end.unit.ref}_{end.pin}" if shared else f"/{switch.name}"
 
 
-def _signals(
+def _wires(
     bundle: str, ends: Sequence[WireEnd], switches: Sequence[PlacedSensor], home: Place | None
 ) -> Iterator[GloveWire]:
+    """Yield the wires of a bundle without their connectors: a signal for each end, then the returns that ends share."""
+    shared: dict[tuple[str, str], list[PlacedSensor]] = {}
     for number, end in enumerate(ends):
         switch = switches[end.switch]
-        yield GloveWire(
-            bundle=bundle,
-            connector="",
-            pin=0,
-            colour=marked(COLOURS[number % len(COLOURS)], number // len(COLOURS)),
-            net=net_of(end, switch),
-            switches=(switch.number,),
-            unit=end.unit.ref,
-            input=end.pin,
-            length_mm=_length([switch], home),
-        )
-
-
-def _returns(
-    bundle: str, ends: Sequence[WireEnd], switches: Sequence[PlacedSensor], home: Place | None
-) -> Iterator[GloveWire]:
-    shared: dict[tuple[str, str], list[PlacedSensor]] = {}
-    for end in ends:
-        shared.setdefault((end.unit.ref, end.other), []).append(switches[end.switch])
+        shared.setdefault((end.unit.ref, end.other), []).append(switch)
+        colour, length = marked(COLOURS[number % len(COLOURS)], number // len(COLOURS)), _length([switch], home)
+        net, unit = net_of(end, switch), end.unit.ref
+        yield GloveWire(bundle, "", 0, colour, net, (switch.number,), unit, end.pin, length)
     for number, ((_, net), group) in enumerate(shared.items()):
-        colour = marked(_RETURN, number)
         numbers = tuple(switch.number for switch in group)
-        yield GloveWire(bundle, "", 0, colour, net, numbers, "", "", _length(group, home))
+        yield GloveWire(bundle, "", 0, marked(_RETURN, number), net, numbers, "", "", _length(group, home))
 
 
 def _length(group: Sequence[PlacedSensor], home: Place | None) -> int | None:

@@ -35,41 +35,26 @@ def in_movements(grasp_set: GraspSet) -> Bits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
-    """Rows in time, in the order in which a live glove sends them: T states, each shown until the next.
+    """Rows in time, in the order in which a live glove sends them: one for each of T ticks.
 
-    rows       (T,)        the row shown in each state, by its number among the rows that come with the stream
-    at_us      (T,) int64  when each state begins, never falling
-    end_us     when the last one ends
-    subject, session       of the recording
+    rows       (T,) the newest row at each tick, by its number among the rows that come with the stream
+    start_us   the time of the first tick
+    subject, session  of the recording
     continued  whether it begins in the middle of a grasp whose first rows are the last of the stream before
     """
 
     rows: Rows
-    at_us: Times
-    end_us: int
-    subject: str = ""
-    session: str = ""
-    continued: bool = False
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    @property
-    def start_us(self) -> int:
-        """The time of the first state."""
-        return int(self.at_us[0])
-
-    def part(self, first: int, beyond: int) -> "Stream":
-        """Return the states `first` to `beyond` - 1."""
-        end_us = self.end_us if beyond == len(self) else int(self.at_us[beyond])
-        return Stream(self.rows[first:beyond], self.at_us[first:beyond], end_us, self.subject, self.session)
+    start_us: int
+    subject: str
+    session: str
+    continued: bool
 
 
 def streams_of(grasp_set: GraspSet, tick_us: int = TICK_US) -> tuple[Stream, ...]:
     """Return the streams of a set, each of one subject in one session, in the order of their first rows.
 
-    A state lasts a tick and shows the newest row. A stream ends before a pause, and where the clock starts again. Rows
-    outside of movements, such as static grasps, belong to no stream. Raises RecordingError if all rows do.
+    A stream ends before a pause, and where the clock starts again. Rows outside of movements, such as static grasps,
+    belong to no stream. Raises RecordingError if all rows do.
     """
     inside = in_movements(grasp_set)
     if not inside.any():
@@ -87,9 +72,9 @@ def streams_of(grasp_set: GraspSet, tick_us: int = TICK_US) -> tuple[Stream, ...
         subject, session = str(grasp_set.subjects[recording[0]]), str(grasp_set.sessions[recording[0]])
         before = -1
         for start_us, ticks in newest(times_us, tick_us, movements[recording]):
-            rows, at_us = recording[ticks], start_us + tick_us * np.arange(len(ticks) + 1)
+            rows = recording[ticks]
             continued = bool(before >= 0 and trials[before] == trials[rows[0]] and not none[before])
-            streams.append(Stream(rows, at_us[:-1], int(at_us[-1]), subject, session, continued))
+            streams.append(Stream(rows, start_us, subject, session, continued))
             before = rows[-1]
     return tuple(sorted(streams, key=lambda stream: int(stream.rows[0])))
 

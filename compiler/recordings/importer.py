@@ -34,7 +34,6 @@ class CodingCost(msgspec.Struct, frozen=True):
     unit: str
     step: float
     largest_error: float
-    rms_error: float
     distinct_before: int
     distinct_after: int
 
@@ -291,8 +290,6 @@ def code_joint(
         unit=joint.unit,
         step=step,
         largest_error=float(errors.max()),
-        # In steps, whose squares are neither too large nor too small for a double.
-        rms_error=math.sqrt(float(np.mean((errors / step) ** 2))) * step,
         distinct_before=len(np.unique(values)),
         distinct_after=len(np.unique(codes)),
     )

@@ -167,11 +167,6 @@ def is_published(taxonomy: Taxonomy) -> bool:
     return taxonomy.name in _PUBLISHED
 
 
-KAMAKURA_14 = published("kamakura14")
-CUTKOSKY_16 = published("cutkosky16")
-FEIX_33 = published("feix33")
-
-
 # The object of a grasp type if none is named.
 ANY = "any"
 # The movements of an empty hand, and the instructions for them.

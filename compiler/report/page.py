@@ -1,18 +1,22 @@
 """The page of a build: one HTML file with its summary, its report and a try, without network, other files or a date."""
 
+import base64
+import hashlib
 from functools import lru_cache, partial
+
+import msgspec
 
 from thenar.drivers.extras import optional
 
 from ..facts import SensorCount
-from ..pictures import colour_variables, embedded, policy_hash, templates
+from ..pictures import colour_variables
 from ..text import sentence
 from . import frontier, sections
 from .content import ReportContent
 from .tryout import script, shared
 
 with optional():
-    from jinja2 import Environment
+    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
 
@@ -50,6 +54,26 @@ def _facts(content: ReportContent, *topics: str) -> list[tuple[str, str]]:
 
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
-    environment = templates(__package__, "templates")
+    environment = Environment(
+        loader=PackageLoader(__package__, "templates"),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
     environment.filters["sentence"] = sentence
     return environment
+
+
+def embedded(data: object) -> Markup:
+    """Return JSON for a script element: whatever a name contains, it begins or ends no tag and is no entity."""
+    text = msgspec.json.encode(data).decode()
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
+
+
+def policy_hash(text: str) -> str:
+    """Return the SHA-256 by which a page's policy allows a script or a style."""
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

@@ -152,16 +152,15 @@ class Binned:
     many: ManyValued
 
 
-def bin_columns(X: NDArray[np.generic], max_bins: int | None = None, weights: Floats | None = None) -> Binned:
+def bin_columns(X: NDArray[np.generic], max_bins: int | None = None) -> Binned:
     """Sort the columns of `X` (n, d), numbers with NaN for missing, into groups; constant ones are omitted.
 
     Columns have at most `max_bins` bins (2 or more; None: one for each value) that hold rows as evenly as possible.
-    Rows count with `weights` (n,), every sum of which must be exact.
     """
     two, rest = _two_valued(X)
     many: dict[int, BinnedColumn] = {}
     for number in rest:
-        column = _bin(np.asarray(X[:, number], dtype=np.float64), max_bins, weights)
+        column = _bin(np.asarray(X[:, number], dtype=np.float64), max_bins)
         # With few bins a column of many values may have only two.
         if column.edges.size and column.bins.max() == 1:
             two[number] = BinnedColumn(column.bins.astype(np.uint8), column.edges)
@@ -192,15 +191,15 @@ def _two_valued(X: NDArray[np.generic]) -> tuple[dict[int, BinnedColumn], list[i
     return two, rest
 
 
-def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -> BinnedColumn:
+def _bin(numbers: Floats, max_bins: int | None) -> BinnedColumn:
     """Return the bins of a column (n,) of numbers, NaN for missing."""
     values, bins, counts = np.unique(numbers, return_inverse=True, return_counts=True)
     present = ~np.isnan(values)
     edges = midpoints(values[present])
     if max_bins is not None and len(edges) >= max_bins:
-        heavy = (counts if weights is None else np.bincount(bins, weights))[present]
         # Edge i lies where the share of rows below it is nearest to i of `max_bins` equal parts; ties go to the first.
-        below, wanted = np.cumsum(heavy)[:-1], np.arange(1, max_bins) * heavy.sum()
+        counts = counts[present]
+        below, wanted = np.cumsum(counts)[:-1], np.arange(1, max_bins) * counts.sum()
         kept = np.unique([np.argmin(np.abs(max_bins * below - share)) for share in wanted])
         edges = edges[kept]
         bins = np.where(np.isnan(numbers), len(edges) + 1, np.searchsorted(kept, bins))

@@ -51,7 +51,7 @@ def fit_discriminant(
     max_bins: int | None = None,
     calibrated: bool = True,
 ) -> ColumnTables:
-    """Fit X (n, d) finite numbers, labels (n,) in 0..n_classes-1 and trials (n,).
+    """Fit X (n, d) bits and integer codes, labels (n,) in 0..n_classes-1 and trials (n,).
 
     Columns of more than two values add scores in proportion to them, between minimum and maximum, and rows of at most
     `max_bins` bins that hold rows as evenly as possible; None: no rows. Unless `calibrated`, scores keep the size that
@@ -59,8 +59,8 @@ def fit_discriminant(
     """
     check_rows(X, labels, n_classes, None)
     check_memory(len(X), n_classes, TrainingError, X.shape[1] * (max_bins or 1))
-    columns = columns_of(X, None, None, np.ones(len(X)))
-    bins = columns_of(X, max_bins, None, None) if max_bins else columns
+    columns = columns_of(X, None, straight=True)
+    bins = columns_of(X, max_bins) if max_bins else columns
     bent = [number for number, column in enumerate(columns) if max_bins and column.line is not None]
     parts = [*map(_inputs, columns), *(_inputs(bins[number]) for number in bent)]
     widths = [part.shape[1] for part in parts]

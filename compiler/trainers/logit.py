@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.model.tables import ScoreTables
-from thenar.runtime.model.terms.base import HIGHEST_CODE
 from thenar.runtime.model.terms.line import Line
 
-from ..elementary import Floats, on_one_grid
+from ..elementary import Floats
 from ..samples import TrainingError
 from ..workers import check_memory
 from .base import MAX_BINS, Report, Setting, Trainer, check_rows
@@ -29,7 +28,7 @@ _FEWER = 3.0  # the pull on the weights that remain is smaller by this factor
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColumnTables:
-    """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of any numbers.
+    """F_k(x) = bias_k + sum over columns of rows[column][bin, k], for columns of bits or codes.
 
     bias   (K,)
     edges  for each column, ascending (B - 1,): the bin of x is the number of edges below it
@@ -42,32 +41,16 @@ class ColumnTables:
     rows: tuple[Floats, ...]
     lines: Mapping[int, tuple[float, float, Floats]] = field(default_factory=dict)
 
-    def scores(self, X: NDArray[np.generic]) -> Floats:
-        """Return F (n, K) of X (n, d)."""
-        scores = np.tile(self.bias, (len(X), 1))
-        for column, (edges, rows) in enumerate(zip(self.edges, self.rows, strict=True)):
-            x = np.asarray(X[:, column], np.float64)
-            scores += rows[np.searchsorted(edges, x)]
-            if column in self.lines:
-                low, high, row = self.lines[column]
-                scores += (np.clip(x, low, high) - low)[:, np.newaxis] * row
-        return scores
-
     def score_tables(self, n_switches: int) -> ScoreTables:
         """Return the tables of [switches | joint codes], the first `n_switches` columns being switches."""
         bias, switch_rows = self.bias, np.zeros((n_switches, len(self.bias)))
         for column in range(n_switches):
             opened, closed = self.rows[column][np.searchsorted(self.edges[column], [0.0, 1.0])]
             bias, switch_rows[column] = bias + opened, closed - opened
-        thresholds, joint_rows = [], []
-        for edges, rows in zip(self.edges[n_switches:], self.rows[n_switches:], strict=True):
-            floors = np.unique(np.floor(edges))
-            steps = floors[(floors >= 0) & (floors < HIGHEST_CODE)]
-            thresholds.append(steps.astype(np.uint16))
-            # The smallest code of each bin.
-            joint_rows.append(rows[np.searchsorted(edges, np.append(0.0, steps + 1))])
+        # An edge lies between two codes, and a threshold is the last code of a bin.
+        thresholds = [np.floor(edges).astype(np.uint16) for edges in self.edges[n_switches:]]
         lines = (Line(column - n_switches, int(low), int(high), row) for column, (low, high, row) in self.lines.items())
-        return ScoreTables.of(bias, switch_rows, thresholds, joint_rows, [*lines])
+        return ScoreTables.of(bias, switch_rows, thresholds, self.rows[n_switches:], [*lines])
 
 
 def fit_logit(
@@ -81,11 +64,10 @@ def fit_logit(
     linear: bool = False,
     sparsity: float = 0.0,
     tolerance: float = TOLERANCE,
-    weights: Floats | None = None,
     counted: int = 0,
     held: NDArray[np.bool_] | None = None,
 ) -> ColumnTables:
-    """Fit X (n, d) finite numbers, labels (n,) in 0..n_classes-1, weights (n,) >= 0.
+    """Fit X (n, d) bits and integer codes, and labels (n,) in 0..n_classes-1.
 
     `penalty` pulls rows towards zero, `smoothness` pulls those of neighbouring bins towards each other. Columns have at
     most `max_bins` bins (2 or more; None: one for each value) that hold frames as evenly as possible. With `linear` a
@@ -93,8 +75,8 @@ def fit_logit(
     pulls the contribution of one standard deviation; a share of these weights, `sparsity`, is 0, relative to the last
     class. The number of set bits among the first `counted` columns adds scores as well, with the weak pull of a bin, so
     that their common effect is learned at once. Frames in `held` (n,) are known not to be of the last class, which
-    learns nothing from them. No derivative of the loss is larger at the solution than `tolerance` times the sum of
-    weights. Raises TrainingError.
+    learns nothing from them. No derivative of the loss is larger at the solution than `tolerance` times the number of
+    frames. Raises TrainingError.
     """
     if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
         raise TrainingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
@@ -102,24 +84,16 @@ def fit_logit(
         raise TrainingError(f"max_bins={max_bins} must be at least 2: a single bin carries no information")
     if not FINEST <= tolerance < 1:
         raise TrainingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
-    check_rows(X, labels, n_classes, weights)
+    check_rows(X, labels, n_classes, None)
     if X.dtype.kind == "f" and np.isnan(X).any():
         raise TrainingError("the inputs hold NaN: a logit has no scores for a missing value")
     check_memory(len(X), n_classes, TrainingError, *X.shape[1:])
-    scale = 1.0
-    if weights is not None:
-        # Scale by a power of two, which changes no result: sums of huge weights stay finite, of tiny ones exact.
-        scale = float(np.ldexp(1.0, -np.frexp(weights.max())[1]))
-        weights = on_one_grid(weights * scale, len(X))
-    heavy = np.ones(len(X)) if weights is None else weights
-    columns = columns_of(X, max_bins, weights, heavy if linear else None)
-    count = count_of(columns[:counted], heavy)
-    pulls = penalty * scale, smoothness * scale
+    columns = columns_of(X, max_bins, straight=linear)
+    count = count_of(columns[:counted])
     every = [*columns, *count]
-    rows = Fit(every, labels, n_classes, *pulls, weights, held).minimum(tolerance)
+    rows = Fit(every, labels, n_classes, penalty, smoothness, held).minimum(tolerance)
     if sparsity and (free := _large(columns, rows, sparsity)) is not None:
-        weaker = pulls[0] / _FEWER, pulls[1] / _FEWER
-        rows = Fit(every, labels, n_classes, *weaker, weights, held, free).minimum(tolerance)
+        rows = Fit(every, labels, n_classes, penalty / _FEWER, smoothness / _FEWER, held, free).minimum(tolerance)
     return tables_of(columns, spread_out(columns, rows, count))
 
 
@@ -141,17 +115,15 @@ def _large(columns: Sequence[Column], rows: Floats, sparsity: float) -> NDArray[
     return free
 
 
-def count_of(columns: Sequence[Column], weights: Floats) -> list[Column]:
+def count_of(columns: Sequence[Column]) -> list[Column]:
     """Return a list with a column that counts the set bits of `columns`; an empty list if the count adds no
     information.
-
-    `weights` (n,) are those of frames.
     """
     bits = [column.bins for column in columns if column.counts]
     number: Floats = np.add.reduce(bits, axis=0).astype(np.float64) if len(bits) > 1 else np.zeros(1)
     if number.min() == number.max():
         return []
-    return [Column(np.zeros(0), np.zeros(len(number), np.intp), 0, Ruler.of(number, weights), free=True)]
+    return [Column(np.zeros(0), np.zeros(len(number), np.intp), 0, Ruler.of(number), free=True)]
 
 
 def spread_out(columns: Sequence[Column], rows: Floats, count: Sequence[Column]) -> Floats:

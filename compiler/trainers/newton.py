@@ -3,15 +3,14 @@
 A column of two values is one row of scores, added at the upper value; any other has a row for each of its bins. Over
 the rows W (r, K), the first of which is the bias, this is minimised:
 
-    sum over frames i of u_i (log sum_k exp F_ik - F_iy)  +  1/2 sum over rows j of pull_j |W_j|^2
+    sum over frames i of log sum_k exp F_ik - F_iy  +  1/2 sum over rows j of pull_j |W_j|^2
         + 1/2 smoothness * (sum of |W_j+1 - W_j|^2 over neighbouring bins j and j + 1 of a column),      F = D W
 
-with u the frames' weights and D (n, r) the bits that say which rows count in a frame. As every row has a pull there is
-one minimum, and it is finite, even if classes are perfectly separable or a class has no frames. Newton's method finds
-it: H V = -gradient is solved by conjugate gradients to a share of the gradient (Nocedal and Wright, Numerical
-Optimization, 2nd ed., algorithm 7.1). Factors of products with D are rounded to a grid first, on which all sums are
-exact, so the result depends neither on the order of frames nor on the machine. Columns as lines have multiples of a
-mark in place of bits.
+with D (n, r) the bits that say which rows count in a frame. As every row has a pull there is one minimum, and it is
+finite, even if classes are perfectly separable or a class has no frames. Newton's method finds it: H V = -gradient is
+solved by conjugate gradients to a share of the gradient (Nocedal and Wright, Numerical Optimization, 2nd ed., algorithm
+7.1). Factors of products with D are rounded to a grid first, on which all sums are exact, so the result depends neither
+on the order of frames nor on the machine. Columns as lines have multiples of a mark in place of bits.
 """
 
 import math
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 
 # As shares of the penalty: the pull on each bin, which its neighbours hold already, and on the bias, to keep it finite.
 BIN_SHARE, BIAS_SHARE = 2.0**-4, 2.0**-10
-# No derivative of the loss is larger than this at the solution, relative to the total weight of the frames.
+# No derivative of the loss is larger than this at the solution, relative to the number of frames.
 TOLERANCE = 1e-7
 # In comparisons this is enough: the accuracies are the same, in half the steps.
 DRAFT = {"tolerance": 1e-4}
@@ -59,17 +58,17 @@ class Ruler:
     variance: float
 
     @classmethod
-    def of(cls, x: Floats, weights: Floats) -> "Ruler":
+    def of(cls, x: Floats) -> "Ruler":
         """Return the ruler for numbers (n,), at least two of which differ."""
         low, high = float(x.min()), float(x.max())
         if not math.isfinite(high - low):
             raise TrainingError(f"a column from {low} to {high} is too wide for a line: scale it")
         # A power of two, so that integers within a range below 1024 lie on marks.
         unit = math.ldexp(1.0, math.frexp(high - low)[1] - 1)
-        places, total = _marked((x - low) / unit), exact_sum(weights)
-        centre = float(_marked(np.array(dot(weights, places) / total)))
+        places = _marked((x - low) / unit)
+        centre = float(_marked(np.array(exact_sum(places) / len(x))))
         steps = places - centre
-        return cls(low, high, unit, centre, steps, dot(weights, steps * steps) / total)
+        return cls(low, high, unit, centre, steps, exact_sum(steps * steps) / len(x))
 
 
 def _marked(units: Floats) -> Floats:
@@ -111,21 +110,19 @@ class Column:
         return pulls
 
 
-def columns_of(
-    X: NDArray[np.generic], max_bins: int | None, weights: Floats | None, straight: Floats | None
-) -> list[Column]:
-    """Return the columns; those of more than two values as lines, if their weights (n,) are given as `straight`."""
-    columns, binned, constant = [], bin_columns(X, max_bins, weights).columns, np.zeros(len(X), np.intp)
+def columns_of(X: NDArray[np.generic], max_bins: int | None, *, straight: bool = False) -> list[Column]:
+    """Return the columns; if `straight`, those of more than two values as lines."""
+    columns, binned, constant = [], bin_columns(X, max_bins).columns, np.zeros(len(X), np.intp)
     for number in range(X.shape[1]):
         column = binned.get(number)
         edges, bins = (np.zeros(0), constant) if column is None else (column.edges, column.bins.astype(np.intp))
         # A single bin is redundant with the bias, and one of two bins with the other.
         if len(edges) < 2:
             columns.append(Column(edges, bins, 1))
-        elif straight is None:
+        elif not straight:
             columns.append(Column(edges, bins, 0))
         else:
-            ruler = Ruler.of(np.asarray(X[:, number], np.float64), straight)
+            ruler = Ruler.of(np.asarray(X[:, number], np.float64))
             columns.append(Column(np.zeros(0), constant, 0, ruler))
     return columns
 
@@ -158,13 +155,11 @@ class Fit:
         n_classes: int,
         penalty: float,
         smoothness: float,
-        weights: Floats | None,
         held: NDArray[np.bool_] | None = None,
         free: NDArray[np.bool_] | None = None,
     ) -> None:
-        n, self._labels, self._weights, self._known = len(labels), labels, weights, held
+        n, self._labels, self._known = len(labels), labels, held
         self._member = (labels[:, np.newaxis] == np.arange(n_classes)).astype(np.float64)
-        self._total = float(n if weights is None else weights.sum())
         self._free, self._grids = free, list[tuple[int, int, tuple[int, int], float]]()
         pull, joined, start = [np.array([BIAS_SHARE * penalty])], [np.zeros(0, np.intp)], 1
         for column in columns:
@@ -191,12 +186,12 @@ class Fit:
             self._stiffness[first:last] += between * np.add.outer(*neighbours).reshape(-1, 1)
 
     def minimum(self, tolerance: float, near: Floats | None = None) -> Floats:
-        """Return the rows at which no derivative exceeds `tolerance` times the total weight of the frames, read-only.
+        """Return the rows at which no derivative exceeds `tolerance` times the number of frames, read-only.
 
         near  starting values for the first of the rows
         """
         design = [part for each in (self._cells, self._shared) for part in (each.data, each.indices, each.indptr)]
-        targets = self._labels, self._member.shape, self._weights, self._known
+        targets = self._labels, self._member.shape, self._known
         given = self._pull, self._joint, self._grids, self._free, tolerance, near
         asked = blake2b(dumps((design, targets, given))).digest()
         if asked in MINIMA:
@@ -205,7 +200,7 @@ class Fit:
         if near is not None:
             rows[: len(near)] = near
         point = self._at(rows)
-        wanted = tolerance * self._total
+        wanted = tolerance * len(self._labels)
         for _ in range(_MOST_STEPS):
             steep = float(np.abs(point.gradient).max())
             if steep <= wanted:
@@ -215,9 +210,7 @@ class Fit:
                     del MINIMA[next(iter(MINIMA))]
                 return point.rows
             point = self._along(point, self._direction(point, max(_UNSOLVED * steep, 0.5 * wanted)))
-        raise TrainingError(
-            f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small for such unequal weights"
-        )
+        raise TrainingError(f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small")
 
     def _at(self, rows: Floats) -> _Point:
         # Put the point on the grid, so that its loss is that of its rows to the last digits.
@@ -225,12 +218,12 @@ class Fit:
         scores = self._cells @ (self._shared @ rows)
         if self._known is not None:
             scores[self._known, -1] = scores.min() - _NO_CHANCE
-        shares, mean = softmax_and_loss(np.ascontiguousarray(scores.T), self._labels, self._weights)
+        shares, mean = softmax_and_loss(np.ascontiguousarray(scores.T), self._labels, None)
         probability, held = np.ascontiguousarray(shares.T), self._held(rows)
         gradient = self._over_frames(probability - self._member) + held
         if self._free is not None:
             gradient *= self._free
-        return _Point(rows, probability, mean * self._total + 0.5 * dot(rows, held), gradient)
+        return _Point(rows, probability, mean * len(self._labels) + 0.5 * dot(rows, held), gradient)
 
     def _held(self, rows: Floats) -> Floats:
         """Return the gradient of the penalties, (r, K)."""
@@ -252,9 +245,7 @@ class Fit:
         return p - self._member, p * (1.0 - p)
 
     def _over_frames(self, values: Floats) -> Floats:
-        """Return the weighted sums (r, K) of `values` (n, K), which are overwritten, over the frames of each row."""
-        if self._weights is not None:
-            values *= self._weights[:, np.newaxis]
+        """Return the sums (r, K) of `values` (n, K) over the frames of each row."""
         summed: Floats = self._by_row @ (self._by_cell @ on_one_grid(values, self._down))
         return summed
 
@@ -273,8 +264,8 @@ class Fit:
     def _direction(self, point: _Point, unsolved: float) -> Floats:
         """Return V with H V = -gradient up to `unsolved`, by conjugate gradients preconditioned with H's diagonal."""
         p = point.probability
-        spread = p * (1.0 - p) if self._weights is None else p * (1.0 - p) * self._weights[:, np.newaxis]
-        diagonal = self._by_row @ (self._squares @ on_one_grid(spread, self._down * _MARKS)) + self._stiffness
+        spread = on_one_grid(p * (1.0 - p), self._down * _MARKS)
+        diagonal = self._by_row @ (self._squares @ spread) + self._stiffness
         found, rest = np.zeros_like(point.rows), -point.gradient
         near = rest / diagonal
         along, size = near, dot(rest, near)

@@ -62,9 +62,9 @@ def fit_pairs(
         raise TrainingError(f"penalty={penalty} must be above 0, and smoothness at least 0, all finite")
     check_rows(X, labels, n_classes, None)
     check_memory(len(X), n_classes, TrainingError, *X.shape[1:])
-    columns = columns_of(X, max_bins, None, None)
-    count = count_of(columns[:counted], np.ones(len(X)))
-    alone = Fit([*columns, *count], labels, n_classes, penalty, smoothness, None, held)
+    columns = columns_of(X, max_bins)
+    count = count_of(columns[:counted])
+    alone = Fit([*columns, *count], labels, n_classes, penalty, smoothness, held)
     rows = alone.minimum(tolerance)
     binned = bin_columns(codes, pair_bins).columns
     found = _ranked(binned, alone.residuals(rows), pairs)
@@ -73,9 +73,8 @@ def fit_pairs(
         for first, second in ((binned[a], binned[b]) for a, b in found):
             shape = len(first.edges) + 1, len(second.edges) + 1
             made.append(Column(np.zeros(0), _cells(first, second), 0, cells=shape, smoothness=pair_smoothness))
-        rows = Fit([*columns, *count, *made], labels, n_classes, penalty, smoothness, None, held).minimum(
-            tolerance, rows
-        )
+        every = [*columns, *count, *made]
+        rows = Fit(every, labels, n_classes, penalty, smoothness, held).minimum(tolerance, rows)
     own = 1 + sum(column.n_rows for column in (*columns, *count))
     tables = tables_of(columns, spread_out(columns, rows[:own], count)).score_tables(s)
     blocks = np.split(rows[own:], np.cumsum([column.n_rows for column in made])[:-1]) if found else []

@@ -226,7 +226,6 @@ def hand_map() -> HandShape:
     )
     names = tuple(patch.name for patch in switches.layout)
     labels = np.stack([ray.at([ray.end + _LABEL_MM], [0.0])[0] for ray in rays()])
-    outline, digits = outlines()
     return HandShape(
         glove="murakami160",
         length_mm=HAND.size.length_mm,
@@ -236,8 +235,7 @@ def hand_map() -> HandShape:
         part_names=PARTS,
         parts=parts,
         sides=sides,
-        outline=outline,
-        digits=digits,
+        outline=outlines()[0],
         strips=strips,
         creases=creases(),
         labels=labels,

@@ -1,6 +1,6 @@
 """The derivatives of a multinomial logit's penalised loss at 60 digits, from the formula alone.
 
-loss = sum over frames i of u_i (log sum_k e^F_ik - F_iy) + 1/2 sum of pull |row|^2 + 1/2 smoothness |next - row|^2
+loss = sum over frames i of log sum_k e^F_ik - F_iy + 1/2 sum of pull |row|^2 + 1/2 smoothness |next - row|^2
 
 Sums are exact, in whole units of 2^-256; only probabilities are rounded before.
 """
@@ -29,7 +29,7 @@ class ReferenceColumn(NamedTuple):
 
 
 @precisely()
-def largest_derivative(columns: Sequence[ReferenceColumn], labels: Sequence[int], weights: Sequence[float]) -> mpf:
+def largest_derivative(columns: Sequence[ReferenceColumn], labels: Sequence[int]) -> mpf:
     """Return the largest derivative with respect to any entry of any column's rows; one column may be the bias."""
     rows = [[list(map(_units, row)) for row in column.rows] for column in columns]
     sums = [list(map(_pulled, of, column.pulls)) for of, column in zip(rows, columns, strict=True)]
@@ -40,11 +40,12 @@ def largest_derivative(columns: Sequence[ReferenceColumn], labels: Sequence[int]
             totals[other] = list(map(add, totals[other], step))
     residuals: dict[tuple[object, ...], list[int]] = {}
     nothing = [0] * len(columns[0].rows[0])
-    for *where, label, weight in zip(*(column.added for column in columns), labels, weights, strict=True):
-        frame, places = (*where, label, weight), [(number, row) for number, row in enumerate(where) if row >= 0]
+    for frame in zip(*(column.added for column in columns), labels, strict=True):
+        *where, label = frame
+        places = [(number, row) for number, row in enumerate(where) if row >= 0]
         if frame not in residuals:
             scores = list(map(sum, zip(nothing, *(rows[number][row] for number, row in places), strict=True)))
-            residuals[frame] = _residual(scores, label, weight)
+            residuals[frame] = _residual(scores, label)
         for number, row in places:
             sums[number][row] = list(map(add, sums[number][row], residuals[frame]))
     largest = max(abs(total) for totals in sums for row in totals for total in row)
@@ -62,12 +63,12 @@ def _pulled(row: Sequence[int], pull: float) -> list[int]:
     return [_units(pull) * entry >> UNIT_BITS for entry in row]
 
 
-def _residual(scores: Sequence[int], label: int, weight: float) -> list[int]:
-    """Return u (P_k - Y_k) of a frame's scores (K,)."""
+def _residual(scores: Sequence[int], label: int) -> list[int]:
+    """Return P_k - Y_k of a frame's scores (K,)."""
     counts = Counter(scores)
     powers = {score: mpmath.exp(mpmath.ldexp(mpf(score), -UNIT_BITS)) for score in counts}
     total = mpmath.fsum(count * powers[score] for score, count in counts.items())
-    shares = {score: int(mpmath.ldexp(weight * power / total, UNIT_BITS)) for score, power in powers.items()}
+    shares = {score: int(mpmath.ldexp(power / total, UNIT_BITS)) for score, power in powers.items()}
     residual = [shares[score] for score in scores]
-    residual[label] -= _units(weight)
+    residual[label] -= _units(1.0)
     return residual

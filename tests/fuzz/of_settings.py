@@ -10,7 +10,7 @@ from mutating import toml_file
 from thenar.compiler.firmware.rows import rows_files
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.ports import ports_of_whole_glove
-from thenar.compiler.recordings.taxonomy import collected
+from thenar.compiler.recordings.taxonomy import collected, published
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.build import Build
@@ -124,9 +124,8 @@ def _scenes() -> list[bytes]:
 
 
 def _kamakura() -> tuple[str, ...]:
-    from thenar.compiler.recordings.taxonomy import KAMAKURA_14
 
-    return KAMAKURA_14.types
+    return published("kamakura14").types
 
 
 def _scene(data: bytes, folder: Path) -> None:

@@ -13,7 +13,7 @@ from thenar.compiler.trainers.base import Training
 from thenar.compiler.trainers.discriminant import fit_discriminant
 
 from ..conftest import grasps
-from .test_logit import SEEDS, numbers
+from .test_logit import SEEDS, numbers, scores_of
 
 
 @given(SEEDS, st.sampled_from([None, 6]))
@@ -29,7 +29,7 @@ def test_it_is_scikit_learns_answer_on_inputs_in_their_units(seed: int, max_bins
     rest = design - np.stack([design[labels == label].mean(axis=0) for label in range(3)])[labels]
     share = ledoit_wolf_shrinkage(rest, assume_centered=True)
     theirs = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=share).fit(design, labels)
-    found, wanted = (log_softmax(scores, axis=1) for scores in (tables.scores(X), theirs.decision_function(design)))
+    found, wanted = (log_softmax(scores, axis=1) for scores in (scores_of(tables, X), theirs.decision_function(design)))
     # A code is rounded to a 512th of its range.
     np.testing.assert_allclose(found, wanted, atol=0.02 * np.abs(wanted).max())
 
@@ -41,7 +41,7 @@ def test_frames_of_a_trial_count_as_one_and_their_order_for_nothing(seed: int) -
     trials, rows = np.arange(len(X)), np.random.default_rng(seed).permutation(np.repeat(np.arange(len(X)), 3))
     once = fit_discriminant(X, labels, trials, 3, max_bins=4, calibrated=False)
     thrice = fit_discriminant(X[rows], labels[rows], trials[rows], 3, max_bins=4, calibrated=False)
-    np.testing.assert_allclose(thrice.scores(X), once.scores(X), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(scores_of(thrice, X), scores_of(once, X), rtol=1e-9, atol=1e-9)
     again = fit_discriminant(X[rows[::-1]], labels[rows[::-1]], trials[rows[::-1]], 3, max_bins=4, calibrated=False)
     assert numbers(again) == numbers(thrice)
 
@@ -53,7 +53,8 @@ def test_calibrated_scores_are_as_sure_as_new_trials_warrant(seed: int) -> None:
     (X, fresh), (labels, truth) = np.split(X, [24]), np.split(labels, [24])
     losses = []
     for calibrated in (True, False):
-        scores = fit_discriminant(X, labels, np.arange(24), 4, max_bins=16, calibrated=calibrated).scores(fresh)
+        tables = fit_discriminant(X, labels, np.arange(24), 4, max_bins=16, calibrated=calibrated)
+        scores = scores_of(tables, fresh)
         losses.append(-log_softmax(scores, axis=1)[np.arange(len(truth)), truth].mean())
     assert losses[0] < losses[1] / 2
 

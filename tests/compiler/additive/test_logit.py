@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import minimize
 from scipy.special import logsumexp
@@ -13,12 +14,24 @@ from sklearn.linear_model import LogisticRegression
 
 from thenar.compiler.elementary import softmax
 from thenar.compiler.samples import TrainingError
-from thenar.compiler.trainers.logit import PENALTY, SMOOTHNESS, ColumnTables, fit_logit
+from thenar.compiler.trainers.logit import ColumnTables, fit_logit
 from thenar.compiler.trainers.newton import BIAS_SHARE, BIN_SHARE, MINIMA
 
 from ..conftest import grasps
 
 SEEDS = st.integers(0, 2**32 - 1)
+
+
+def scores_of(tables: ColumnTables, X: NDArray[np.generic]) -> NDArray[np.float64]:
+    """Return the scores (n, K) of rows (n, d) of any numbers, column by column."""
+    scores = np.tile(tables.bias, (len(X), 1))
+    for column, (edges, rows) in enumerate(zip(tables.edges, tables.rows, strict=True)):
+        x = np.asarray(X[:, column], np.float64)
+        scores += rows[np.searchsorted(edges, x)]
+        if column in tables.lines:
+            low, high, row = tables.lines[column]
+            scores += (np.clip(x, low, high) - low)[:, np.newaxis] * row
+    return scores
 
 
 def numbers(tables: ColumnTables) -> bytes:
@@ -46,7 +59,7 @@ def test_it_is_scikit_learns_answer_on_the_expanded_design(seed: int, pulls: tup
     theirs = LogisticRegression(C=1.0, fit_intercept=False, tol=1e-10, solver="newton-cg", max_iter=1000)
     theirs.fit(np.hstack(parts) @ spread, labels)
     found = np.hstack(parts) @ (spread @ theirs.coef_.T)
-    np.testing.assert_allclose(tables.scores(X), found, atol=1e-5)
+    np.testing.assert_allclose(scores_of(tables, X), found, atol=1e-5)
 
 
 @given(SEEDS, st.sampled_from([0.1, 3.0]))
@@ -54,36 +67,29 @@ def test_it_is_scikit_learns_answer_on_the_expanded_design(seed: int, pulls: tup
 def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: float) -> None:
     X, labels = grasps(seed)
     X[:, :6] *= 7  # of two values, that need not be 0 and 1
-    weights = np.random.default_rng(seed).integers(1, 4, len(X)).astype(float)
-    own: dict[str, Any] = {"penalty": 1.0, "smoothness": smoothness, "linear": True}
-    tables = fit_logit(X, labels, 3, **own, tolerance=1e-10, weights=weights)
-    deviation = np.sqrt(np.average((X[:, 6:] - np.average(X[:, 6:], 0, weights)) ** 2, 0, weights))
-    pulls = np.r_[BIAS_SHARE, np.ones(6), (BIN_SHARE + smoothness) * deviation**2]
-    design = np.column_stack([np.ones(len(X)), X[:, :6] / 7, X[:, 6:] - np.average(X[:, 6:], 0, weights)])
+    tables = fit_logit(X, labels, 3, penalty=1.0, smoothness=smoothness, linear=True, tolerance=1e-10)
+    pulls = np.r_[BIAS_SHARE, np.ones(6), (BIN_SHARE + smoothness) * X[:, 6:].var(axis=0)]
+    design = np.column_stack([np.ones(len(X)), X[:, :6] / 7, X[:, 6:] - X[:, 6:].mean(axis=0)])
     theirs = LogisticRegression(C=1.0, fit_intercept=False, tol=1e-9, solver="newton-cg", max_iter=1000)
-    theirs.fit(design / np.sqrt(pulls), labels, weights)
+    theirs.fit(design / np.sqrt(pulls), labels)
     # A column is centred to the half of a 512th of its range, and so is what pulls its bias.
-    np.testing.assert_allclose(tables.scores(X), (design / np.sqrt(pulls)) @ theirs.coef_.T, atol=2e-3)
+    np.testing.assert_allclose(scores_of(tables, X), (design / np.sqrt(pulls)) @ theirs.coef_.T, atol=2e-3)
     # Beyond what was trained on a line is flat.
     beyond = np.vstack([X[:1], X[:1]]).astype(float)
     beyond[0, 6:], beyond[1, 6:] = X[:, 6:].max(axis=0), 1e6
-    assert np.ptp(tables.scores(beyond), axis=0).max() == 0
+    assert np.ptp(scores_of(tables, beyond), axis=0).max() == 0
 
 
-@given(SEEDS, st.booleans())
+@given(SEEDS)
 @settings(max_examples=10, deadline=None)
-def test_counted_bits_and_frames_known_to_be_held_are_scipys_answer(seed: int, weighted: bool) -> None:
+def test_counted_bits_and_frames_known_to_be_held_are_scipys_answer(seed: int) -> None:
     X, labels = grasps(seed, joints=0)
-    random = np.random.default_rng(seed)
-    held = (labels < 2) & (random.random(len(X)) < 0.7)
-    weights = random.integers(1, 4, len(X)).astype(float) if weighted else np.ones(len(X))
-    tables = fit_logit(
-        X, labels, 3, penalty=0.5, weights=weights if weighted else None, tolerance=1e-10, counted=6, held=held
-    )
+    held = (labels < 2) & (np.random.default_rng(seed).random(len(X)) < 0.7)
+    tables = fit_logit(X, labels, 3, penalty=0.5, tolerance=1e-10, counted=6, held=held)
     number = X.sum(axis=1)
-    centred = number - np.average(number, weights=weights)
+    centred = number - number.mean()
     design = np.column_stack([np.ones(len(X)), X, centred])
-    pulls = 0.5 * np.r_[BIAS_SHARE, np.ones(6), BIN_SHARE * np.average(centred**2, weights=weights)]
+    pulls = 0.5 * np.r_[BIAS_SHARE, np.ones(6), BIN_SHARE * np.mean(centred**2)]
     never = np.where(held[:, np.newaxis] & (np.arange(3) == 2), -np.inf, 0.0)
 
     def loss(flat: Any) -> tuple[float, Any]:
@@ -92,13 +98,11 @@ def test_counted_bits_and_frames_known_to_be_held_are_scipys_answer(seed: int, w
         over = np.exp(scores - logsumexp(scores, axis=1, keepdims=True)) - np.eye(3)[labels]
         lost = logsumexp(scores, axis=1) - scores[np.arange(len(X)), labels]
         pulled = pulls[:, np.newaxis] * rows
-        return float(weights @ lost + 0.5 * (pulled * rows).sum()), (
-            design.T @ (weights[:, np.newaxis] * over) + pulled
-        ).ravel()
+        return float(lost.sum() + 0.5 * (pulled * rows).sum()), (design.T @ over + pulled).ravel()
 
     theirs = minimize(loss, np.zeros(design.shape[1] * 3), jac=True, options={"gtol": 1e-9, "maxiter": 2000}).x
     # A count is centred to the half of a 512th of its range, as a line is.
-    np.testing.assert_allclose(tables.scores(X), design @ theirs.reshape(-1, 3), atol=2e-3)
+    np.testing.assert_allclose(scores_of(tables, X), design @ theirs.reshape(-1, 3), atol=2e-3)
 
 
 @given(SEEDS)
@@ -116,24 +120,9 @@ def test_neither_the_order_of_rows_nor_that_of_columns_changes_a_bit(seed: int) 
     assert numbers(fit_logit(X[:, columns], labels, 3, linear=linear)) == numbers(expected)
 
 
-@given(SEEDS)
-@settings(max_examples=10, deadline=None)
-def test_a_row_counts_as_often_as_it_weighs(seed: int) -> None:
-    X, labels = grasps(seed, n=40)
-    weights = np.random.default_rng(seed).integers(1, 5, len(X)).astype(float)
-    own: dict[str, Any] = {"max_bins": 4, "tolerance": 1e-11}
-    repeated = fit_logit(X.repeat(weights.astype(int), axis=0), labels.repeat(weights.astype(int)), 3, **own)
-    weighted = fit_logit(X, labels, 3, weights=weights, **own)
-    assert [edges.tolist() for edges in weighted.edges] == [edges.tolist() for edges in repeated.edges]
-    for ours, theirs in zip(weighted.rows, repeated.rows, strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=1e-7)
-    halves = fit_logit(X, labels, 3, weights=weights / 2, penalty=PENALTY / 2, smoothness=SMOOTHNESS / 2, **own)
-    assert numbers(halves) == numbers(weighted)
-
-
 def test_a_class_without_rows_is_unlikely_and_finite() -> None:
     X, labels = grasps(1)
-    probability = softmax(np.ascontiguousarray(fit_logit(X, labels, 5).scores(X).T))
+    probability = softmax(np.ascontiguousarray(scores_of(fit_logit(X, labels, 5), X).T))
     assert probability[3:].max() < 0.01
     assert probability[3:].min() > 0
 
@@ -143,11 +132,12 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
     X, labels = grasps(3)
     fitted = fit_logit(X, labels, 3, linear=linear)
     found = fitted.score_tables(6).scores(X[:, :6].astype(bool), X[:, 6:].astype(np.uint16))
-    np.testing.assert_allclose(found, fitted.scores(X), rtol=0, atol=1e-12)
-    # Edges between numbers that are no codes, and below all codes.
-    odd = ColumnTables(np.zeros(2), (np.array([-3.5, 1.2, 1.7, 4.0]),), (np.arange(10.0).reshape(5, 2),))
-    codes = np.arange(7, dtype=np.uint16)[:, np.newaxis]
-    assert np.array_equal(odd.score_tables(0).scores(np.zeros((7, 0), bool), codes), odd.scores(codes))
+    np.testing.assert_allclose(found, scores_of(fitted, X), rtol=0, atol=1e-12)
+    # Codes next to each other, at both ends of their range.
+    ends = np.array([0, 1, 2, 65533, 65534, 65535] * 3, np.uint16)[:, np.newaxis]
+    fitted = fit_logit(ends, np.arange(18) % 3, 3, max_bins=None, linear=linear)
+    found = fitted.score_tables(0).scores(np.zeros((18, 0), bool), ends)
+    np.testing.assert_allclose(found, scores_of(fitted, ends), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +147,6 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
         ({"smoothness": float("inf")}, "smoothness=inf"),
         ({"max_bins": 1}, "max_bins=1 must be at least 2"),
         ({"tolerance": 0.0}, "tolerance=0.0 must be at least 1e-12"),
-        ({"weights": np.zeros(60)}, "not all zero"),
     ],
 )
 def test_what_makes_no_sense_is_refused(changes: dict[str, Any], because: str) -> None:
@@ -171,7 +160,6 @@ def test_what_makes_no_sense_is_refused(changes: dict[str, Any], because: str) -
         {"penalty": 2.0},
         {"smoothness": 1.0},
         {"tolerance": 1e-3},
-        {"weights": np.where(np.arange(60) % 2, 0.6, 0.9)},
         {"held": np.arange(60) < 30},
         {"counted": 6},
         {"linear": True},
@@ -199,7 +187,7 @@ def test_sparse_lines_are_the_best_of_all_with_these_weights_zero(seed: int, spa
     sizes = np.abs(whole[:, :-1] - whole[:, -1:]) * X[:, 6:].std(axis=0)[:, np.newaxis]
     assert sizes[found[:, :-1] == 0].max() <= sizes[found[:, :-1] != 0].min(initial=np.inf)
     # No derivative is left: the gradient of the loss, of the penalty, and nothing else, at each weight that is not 0.
-    over = softmax(np.ascontiguousarray(tables.scores(X).T)).T - (labels[:, np.newaxis] == np.arange(3))
+    over = softmax(np.ascontiguousarray(scores_of(tables, X).T)).T - (labels[:, np.newaxis] == np.arange(3))
     pull = (1 + BIN_SHARE) / 3  # of the weights that remain, a third of the others'
     slopes = (X[:, 6:] - X[:, 6:].mean(axis=0)).T @ over + pull * X[:, 6:].var(axis=0)[:, np.newaxis] * found
     np.testing.assert_allclose(slopes[found != 0], 0, atol=0.02 * np.abs(X[:, 6:]).max())

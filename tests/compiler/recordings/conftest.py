@@ -6,7 +6,7 @@ import pytest
 
 from thenar.compiler.recordings import RecordingError, check_names
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import CUTKOSKY_16, FEIX_33, KAMAKURA_14, Taxonomy, own
+from thenar.compiler.recordings.taxonomy import Taxonomy, own, published
 
 
 def _is_name(text: str) -> bool:
@@ -44,7 +44,8 @@ def grasp_sets(draw: st.DrawFn) -> GraspSet:
     types = st.lists(NAMES, min_size=1, max_size=5, unique=True).flatmap(
         lambda names: st.sampled_from([own(names), Taxonomy("the lab's", tuple(names))])
     )
-    taxonomy: Taxonomy = draw(st.one_of(st.sampled_from([KAMAKURA_14, CUTKOSKY_16, FEIX_33]), types))
+    taxonomies = st.sampled_from(["kamakura14", "cutkosky16", "feix33"]).map(published)
+    taxonomy: Taxonomy = draw(st.one_of(taxonomies, types))
     random = np.random.default_rng(draw(st.integers(0, 2**32)))
     names = draw(st.sampled_from([taxonomy.types, taxonomy.names]))
     times = draw(st.sampled_from([0, 10_000, 2**40])) * np.cumsum(random.integers(0, 9, rows))
@@ -78,7 +79,7 @@ def small() -> GraspSet:
         codes=np.array([[1, 7], [2, 7], [2, 7], [1, 7], [3, 7], [4, 7]]),
         joints=(Joint("index", "deg", 0, -10.0, 100, 40.0), Joint("wrist", "deg", 0, 0.0, 1, 0.5)),
         grasps=np.array(["PoS", "PoH", "Tip", "PoS", "Tip", "PoH"]),
-        taxonomy=KAMAKURA_14,
+        taxonomy=published("kamakura14"),
         subjects=np.array(["A", "A", "A", "B", "B", "A"]),
         objects=np.array(["mug"] * 6),
         trials=np.arange(6),

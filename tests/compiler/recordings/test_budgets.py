@@ -12,7 +12,7 @@ import pytest
 from thenar.compiler.recordings import TableError, unpacked
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.table import read_table
-from thenar.compiler.recordings.taxonomy import FEIX_33
+from thenar.compiler.recordings.taxonomy import published
 
 SWITCHES = 'label = "g"\nframes = "independent"\nswitches = ["s*"]\n'
 JOINTS = 'label = "g"\nframes = "independent"\n[[joints]]\ncolumns = ["s*"]\n'
@@ -81,7 +81,7 @@ def test_a_set_takes_no_more_memory_than_its_size_allows(tmp_path: Path) -> None
         codes=np.zeros((rows, 0), np.uint16),
         joints=(),
         grasps=np.full(rows, "Index Finger Extension"),
-        taxonomy=FEIX_33,
+        taxonomy=published("feix33"),
         subjects=np.full(rows, "a" * 60),
         objects=np.full(rows, "b" * 60),
         trials=np.arange(rows),

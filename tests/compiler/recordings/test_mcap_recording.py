@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from thenar.compiler.recordings import TableError
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.mcap_recording import _Grasp, _Part, _taxel, import_recordings
-from thenar.compiler.recordings.taxonomy import KAMAKURA_14
+from thenar.compiler.recordings.taxonomy import published
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.calibration import CodeTables, Meaning, numbers_of
 from thenar.runtime.frames import GloveFrame, SwitchFrame
@@ -31,7 +31,7 @@ CALIBRATION = GloveCalibration(
 COLLECTION = Collection(
     "A",
     "kamakura14",
-    KAMAKURA_14.types,
+    published("kamakura14").types,
     (CollectionTask("PoS", ("jar",)), CollectionTask("Tip", ("pin",))),
     repetitions=3,
     seed=0,
@@ -77,7 +77,7 @@ def test_every_accepted_trial_is_a_row_of_what_was_captured(write: Write) -> Non
     assert grasp_set.objects.tolist() == ["jar", "pin", "jar"]
     assert grasp_set.subjects.tolist() == ["A"] * 3
     assert grasp_set.trials.tolist() == [1, 2, 3]
-    assert grasp_set.taxonomy == KAMAKURA_14
+    assert grasp_set.taxonomy == published("kamakura14")
     assert grasp_set.joints == tuple(Joint(name, "raw", 1, 1.0, 255, 255.0) for name in SENSORS[:2])
     assert (report.table, report.frames, report.joints) == ("a.mcap", 3, 2)
 

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler.recordings.mcap_recording import import_files, import_recordings
-from thenar.compiler.recordings.taxonomy import KAMAKURA_14, MOVEMENTS, collected
+from thenar.compiler.recordings.taxonomy import MOVEMENTS, collected, published
 from thenar.runtime.errors import FormatError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.recording.guide import MOVING_US, CollectionGuide, planned, read_journal
@@ -19,7 +19,7 @@ SENSORS = tuple(f"j{number}" for number in range(4))
 START_US, COUNTDOWN_US, TICK_US = 1_000_000, 2_000_000, 5_000
 GRASPS = (CollectionTask("PoS", ("jar",)), CollectionTask("Tip", ("pin",)))
 COLLECTION = Collection(
-    "A", "kamakura14", KAMAKURA_14.types, (*GRASPS, CollectionTask("none", tuple(MOVEMENTS)[:2])), 2, 3
+    "A", "kamakura14", published("kamakura14").types, (*GRASPS, CollectionTask("none", tuple(MOVEMENTS)[:2])), 2, 3
 )
 SESSION = Session(thenar="1", switches=("s1", "s2", "s3"), sensors=SENSORS, collection=COLLECTION)
 POSES: dict[str, tuple[int, tuple[float, ...]]] = {
@@ -199,7 +199,7 @@ def test_a_stream_longer_than_its_file_can_have_recorded_is_refused(
 
 def test_the_empty_hand_is_collected_where_it_is_asked_for(tmp_path: Path) -> None:
     types, tasks = collected("kamakura14", None, none=True)
-    assert types == KAMAKURA_14
+    assert types == published("kamakura14")
     assert (len(tasks), tasks[-1]) == (15, CollectionTask("none", tuple(MOVEMENTS)))
     objects = tmp_path / "objects.toml"
     objects.write_text('cup = ["mug"]\nNone = ["wave"]\npen = ["biro"]\n', encoding="utf-8")

@@ -10,7 +10,7 @@ from thenar.compiler import merge, split
 from thenar.compiler.recordings import RecordingError
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.merging import By, split_into
-from thenar.compiler.recordings.taxonomy import FEIX_33, own
+from thenar.compiler.recordings.taxonomy import own, published
 
 from .conftest import grasp_sets
 
@@ -124,7 +124,7 @@ INDEX, WRIST = Joint("index", "deg", 0, -10.0, 100, 40.0), Joint("wrist", "deg",
             "a.grasps: index gets codes above 65535",
         ),
         ({"taxonomy": own(["PoS", "PoH", "Tip"])}, "taxonomy kamakura14, b.grasps of own: import both with one"),
-        ({"taxonomy": FEIX_33, "grasps": np.full(6, "Tripod")}, "taxonomy kamakura14, b.grasps of feix33"),
+        ({"taxonomy": published("feix33"), "grasps": np.full(6, "Tripod")}, "taxonomy kamakura14, b.grasps of feix33"),
         ({"independent": True}, 'b.grasps states `frames = "independent"`, a.grasps does not'),
         (
             {"subjects": np.full(6, "A")},

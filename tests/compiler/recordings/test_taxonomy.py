@@ -6,19 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings import RecordingError, TableError
-from thenar.compiler.recordings.taxonomy import (
-    CUTKOSKY_16,
-    FEIX_33,
-    KAMAKURA_14,
-    Taxonomy,
-    collected,
-    own,
-    published,
-    published_for,
-)
+from thenar.compiler.recordings.taxonomy import Taxonomy, collected, own, published, published_for
 from thenar.runtime.recording.session import CollectionTask
 
-PUBLISHED = [KAMAKURA_14, CUTKOSKY_16, FEIX_33]
+PUBLISHED = [published("kamakura14"), published("cutkosky16"), published("feix33")]
 
 
 @pytest.mark.parametrize("taxonomy", PUBLISHED, ids=lambda taxonomy: taxonomy.name)
@@ -39,11 +30,11 @@ def test_types_are_found_by_any_spelling_or_number(taxonomy: Taxonomy) -> None:
 
 
 def test_labels_of_recordings_are_read_as_feix_wrote_them() -> None:
-    assert FEIX_33.find("Adduction_Grip") == "Adduction Grip"
-    assert FEIX_33.find("Sphere_4_finger") == "Sphere 4 Finger"
-    assert CUTKOSKY_16.find("disk power") == "Disk (power)"
-    assert KAMAKURA_14.find("Power grip standard type") == "PoS"
-    assert {FEIX_33.find(label) for label in ("ExtensionType", "extension-type", "EXTENSION_TYPE")} == {
+    assert published("feix33").find("Adduction_Grip") == "Adduction Grip"
+    assert published("feix33").find("Sphere_4_finger") == "Sphere 4 Finger"
+    assert published("cutkosky16").find("disk power") == "Disk (power)"
+    assert published("kamakura14").find("Power grip standard type") == "PoS"
+    assert {published("feix33").find(label) for label in ("ExtensionType", "extension-type", "EXTENSION_TYPE")} == {
         "Extension Type"
     }
 
@@ -58,9 +49,9 @@ def test_labels_that_one_published_taxonomy_alone_names_are_its_types() -> None:
 
 
 def test_an_unknown_label_is_answered_with_the_nearest_types() -> None:
-    said = FEIX_33.unknown("Adducted Grip")
+    said = published("feix33").unknown("Adducted Grip")
     assert re.fullmatch(r"'Adducted Grip' is not a grasp type of feix33 .*'Adduction Grip'.*", said)
-    assert "its types: PoS, PoH, PoI, PoE, PoD, ..." in KAMAKURA_14.unknown("zzzz")
+    assert "its types: PoS, PoH, PoI, PoE, PoD, ..." in published("kamakura14").unknown("zzzz")
 
 
 def test_numbers_mean_nothing_in_a_taxonomy_of_ones_own() -> None:
@@ -95,8 +86,8 @@ def test_types_that_cannot_be_told_apart_or_read_are_refused() -> None:
 
 
 def test_labels_of_many_digits_are_compared_and_shown_short() -> None:
-    assert FEIX_33.find("0" * 5000 + "7") == FEIX_33.types[6]
-    said = FEIX_33.unknown("9" * 5000)
+    assert published("feix33").find("0" * 5000 + "7") == published("feix33").types[6]
+    said = published("feix33").unknown("9" * 5000)
     assert said.startswith(f"'{'9' * 79}... is not a grasp type of feix33")
     assert len(said) < 300
 
@@ -108,14 +99,14 @@ def file(tmp_path: Path) -> Path:
 
 def test_without_a_list_every_type_is_collected_with_any_object() -> None:
     taxonomy, tasks = collected("kamakura14", None)
-    assert taxonomy == KAMAKURA_14
-    assert tasks == tuple(CollectionTask(grasp, ("any",)) for grasp in KAMAKURA_14.types)
+    assert taxonomy == published("kamakura14")
+    assert tasks == tuple(CollectionTask(grasp, ("any",)) for grasp in published("kamakura14").types)
 
 
 def test_a_list_says_which_types_and_with_what(file: Path) -> None:
     file.write_text('pos = ["bottle", "jar"]\n"tip grip" = ["pin"]\n')
     taxonomy, tasks = collected("kamakura14", file)
-    assert taxonomy == KAMAKURA_14
+    assert taxonomy == published("kamakura14")
     assert tasks == (CollectionTask("PoS", ("bottle", "jar")), CollectionTask("Tip", ("pin",)))
 
 

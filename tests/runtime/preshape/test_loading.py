@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.taxonomy import CUTKOSKY_16, KAMAKURA_14
+from thenar.compiler.recordings.taxonomy import published
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.preshape import SHIPPED, PreshapeTable, load_preshapes
 
@@ -99,18 +99,18 @@ def test_no_shipped_position_is_beyond_the_barrett_hands_reach() -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_table_names_all_of_kamakuras_grasp_types(name: str) -> None:
-    assert load_preshapes(name).check(KAMAKURA_14.types) == ""
+    assert load_preshapes(name).check(published("kamakura14").types) == ""
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_table_names_no_grasp_type_that_no_taxonomy_has(name: str) -> None:
-    assert set(load_preshapes(name).chosen) <= {*KAMAKURA_14.types, *CUTKOSKY_16.types}
+    assert set(load_preshapes(name).chosen) <= {*published("kamakura14").types, *published("cutkosky16").types}
 
 
 def test_where_the_literature_gives_nothing_the_table_says_so() -> None:
     table = load_preshapes("barrett_bh8")
     assert table.chosen.get("Light tool") is None
-    assert table.check(CUTKOSKY_16.types) == (
+    assert table.check(published("cutkosky16").types) == (
         "preshapes Barrett BH8: none for Light tool: nothing is sent to the hand for those"
     )
 

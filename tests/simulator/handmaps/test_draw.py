@@ -9,7 +9,7 @@ import pytest
 from thenar.compiler.hand import MapError
 from thenar.compiler.pictures import PictureError, painting
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.taxonomy import KAMAKURA_14, own
+from thenar.compiler.recordings.taxonomy import own, published
 from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, colour, contacts, draw, kept
 from thenar.simulator.handmaps.handmap import hand_map
 
@@ -20,7 +20,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def grasp_set(switches: np.ndarray, names: tuple[str, ...], grasps: list[str]) -> GraspSet:
     n = len(grasps)
-    taxonomy = KAMAKURA_14 if "Tip" in grasps else own(["Tip", "Lat", "a < b & $c$"])
+    taxonomy = published("kamakura14") if "Tip" in grasps else own(["Tip", "Lat", "a < b & $c$"])
     texts = (np.array(grasps, dtype=str), taxonomy, np.full(n, "A"), np.full(n, "pen"), np.arange(n))
     return GraspSet(switches, names, np.zeros((n, 0), np.uint16), (), *texts)
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from thenar.compiler.hand import HandShape, MapError
 from thenar.drivers.errors import ThenarError
 from thenar.simulator.body.layout import SwitchPlaces, murakami160
-from thenar.simulator.handmaps.handmap import HAND, PARTS, RADIUS_MM, hand_map, rays
+from thenar.simulator.handmaps.handmap import HAND, PARTS, RADIUS_MM, hand_map, outlines, rays
 
 Floats = NDArray[np.float64]
 DIGITS = range(5)
@@ -58,7 +58,7 @@ def test_no_two_switches_overlap(glove: HandShape) -> None:
 
 @pytest.mark.parametrize("digit", DIGITS)
 def test_a_switchs_circle_lies_wholly_within_its_part(glove: HandShape, digit: int) -> None:
-    ray = rays()[digit]
+    ray, own = rays()[digit], outlines()[1][digit]
     for switch in np.flatnonzero(glove.parts == digit):
         place, side = glove.places[switch], glove.sides[switch]
         if side:
@@ -68,10 +68,10 @@ def test_a_switchs_circle_lies_wholly_within_its_part(glove: HandShape, digit: i
         else:
             # A finger's outline begins where it leaves the palm; the ball of the thumb is of the palm's outline.
             beyond_the_web = (place - ray.base) @ ray.ahead > (0.3 if digit else 1.2) * ray.joints[1]
-            assert inside(rim(place), glove.digits[digit] if beyond_the_web else glove.outline).all()
+            assert inside(rim(place), own if beyond_the_web else glove.outline).all()
     palm = glove.places[glove.parts == 5]
     assert inside(np.concatenate(list(map(rim, palm))), glove.outline).all()
-    assert not inside(palm, glove.digits[digit]).any()
+    assert not inside(palm, own).any()
 
 
 def test_it_is_a_right_hand_seen_from_its_palm(glove: HandShape) -> None:

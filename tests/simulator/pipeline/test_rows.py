@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.recordings.taxonomy import KAMAKURA_14
+from thenar.compiler.recordings.taxonomy import published
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.cyberglove import common_joints
 from thenar.simulator.body.layout import murakami160
@@ -70,7 +70,9 @@ def blocks_of(recorded: list[Recorded], size: int, setting: SceneSetting) -> lis
 
 def set_of(rows: Rows, recorded: list[Recorded]) -> GraspSet:
     conditions = [condition for condition, _, _ in recorded]
-    return grasp_set(rows, conditions, SWITCHES, (), common_joints(), KAMAKURA_14, "scene small", timed=True)
+    return grasp_set(
+        rows, conditions, SWITCHES, (), common_joints(), published("kamakura14"), "scene small", timed=True
+    )
 
 
 SUBJECTS = np.array([0, 0, 1])
