@@ -10,6 +10,8 @@ from .parameters import Number, OutputFolder, existing_file, existing_folder
 from .printing import json_flag, out, show, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from thenar.compiler.glove.spec import SpecSummary
     from thenar.runtime.harness.wiring import Harness
 
@@ -46,7 +48,7 @@ def command(
         thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
         thenar spec build/ --layout layout.toml -o spec/
     """
-    from thenar.compiler.glove.files import check_output, files_of, write_spec
+    from thenar.compiler.glove.files import check_output, expectations, files_of, write_spec
     from thenar.compiler.glove.prices import load_prices
     from thenar.compiler.glove.spec import glove_spec
     from thenar.compiler.scan_file import load_scan
@@ -66,7 +68,7 @@ def command(
         files = files_of(spec)
         write_spec(files, output)
         written = f"{output}: {', '.join(sorted(files))}"
-    show(spec.summary, _print, written)
+    show(spec.summary, lambda summary: _print(summary, expectations(spec), written))
 
 
 def _harness(folder: Path, wired: bool, glove: Path | None) -> "Harness | None":
@@ -79,7 +81,7 @@ def _harness(folder: Path, wired: bool, glove: Path | None) -> "Harness | None":
     return load_harness(own) if wired and own.is_file() else None
 
 
-def _print(spec: "SpecSummary", written: str | None) -> None:
+def _print(spec: "SpecSummary", expected: "Iterable[str]", written: str | None) -> None:
     """Print the content of `spec.json` for people, and the names of the written files."""
     from thenar.compiler.glove.layout import counted_sensors
 
@@ -106,7 +108,7 @@ def _print(spec: "SpecSummary", written: str | None) -> None:
     console.print(materials)
     if spec.print_on:
         console.print(f"the pattern is for {spec.print_on}")
-    for sentence in (*spec.expected, *spec.remarks):
+    for sentence in (*expected, *spec.remarks):
         console.print(sentence)
     if written is not None:
         console.print(written, soft_wrap=True)

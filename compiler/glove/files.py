@@ -17,7 +17,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
-from ..text import cells
+from ..text import cells, sentence
 from .circuit import BillLine, Circuit, Component, ComponentKind
 from .layout import CONTACT_MM, counted_sensors
 from .prices import Part
@@ -25,6 +25,8 @@ from .spec import GloveSpec, SpecSummary, glove_spec
 
 Row = Sequence[object]
 _WIDTH = 100
+# Topics of facts that say what to expect of the glove.
+_EXPECTED = ("scan", "accuracy", "caution", "faults")
 # Of the netlist.
 _VERSION = "E"
 # An arbitrary constant: identifiers must only be the same whenever the same component is written.
@@ -89,7 +91,7 @@ def readme_of(spec: GloveSpec) -> str:
     """Return the text of README.txt."""
     summary = spec.summary
     parts = [f"{summary.glove}: a glove with {summary.kept}", *_building(summary)]
-    parts += ["What to expect", *summary.expected]
+    parts += ["What to expect", *expectations(spec)]
     doubts = [f"{m.part or m.what}: {m.note}" for m in summary.materials if not m.sure]
     parts += [
         "Please note",
@@ -101,6 +103,11 @@ def readme_of(spec: GloveSpec) -> str:
     headings = {parts[0], "To cut and sew", "To wire", "To solder", "To run", "What to expect", "Please note"}
     laid_out = (f"{part}\n{'-' * len(part)}\n" if part in headings else fill(part, _WIDTH) + "\n" for part in parts)
     return "\n".join(laid_out)
+
+
+def expectations(spec: GloveSpec) -> Iterator[str]:
+    """Yield sentences on times and accuracy."""
+    return (sentence(str(fact)) for fact in spec.facts if fact.topic in _EXPECTED)
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:

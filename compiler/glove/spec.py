@@ -9,14 +9,14 @@ from msgspec.structs import replace
 from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.live.system import own_joints
-from thenar.runtime.manifest import Manifest, Switch
+from thenar.runtime.manifest import Detected, Faults, Manifest, Recognised, Switch
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import plan_scan, unwired
 from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import glove_us, scan_us
 
-from ..facts import SensorCount, facts
+from ..facts import Fact, SensorCount, facts
 from ..hand import HandShape
-from ..text import sentence
 from .circuit import BillLine, Circuit, bill_of, bill_of_joints, bill_of_parts, glove_circuit
 from .layout import (
     GloveWire,
@@ -34,8 +34,49 @@ from .pattern import Pattern, pattern_of
 from .prices import Part
 from .propose import propose_cyberglove, propose_harness
 
-# Topics of facts that say what to expect of the glove.
-_EXPECTED = ("scan", "accuracy", "caution", "faults")
+
+class ExpectedPerformance(Struct, frozen=True):
+    """Times calculated from bus arithmetic, in microseconds, without the computer's overhead per transaction.
+
+    scan_us      scan of all kept switches on expanders, in `transactions` transactions, mux selections included
+    full_us      scan of all switches that are wired to expanders, kept or not
+    rows_us      from row to row of each stream with kept sensors
+    glove_us     between records of the CyberGlove with `sensors` sensors, the build's joints; None without joints
+    rates        the accuracy measured when the build was compiled
+    faults       the accuracy on the training rows under the worst faults
+    detection    the detection rates of nothing held
+    """
+
+    transactions: int
+    scan_us: float
+    full_us: float
+    rows_us: tuple[int, ...]
+    sensors: int
+    glove_us: float | None
+    rates: tuple[Recognised, ...]
+    faults: Faults | None = None
+    detection: tuple[Detected, ...] = ()
+
+
+def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> ExpectedPerformance:
+    """Return the expected times and rates of a build's switches in a harness, with a complete scan by `scan`."""
+    time = scan_us(scan, harness)
+    glove = harness.cyberglove if manifest.joints else None
+    return ExpectedPerformance(
+        transactions=len(scan.ports) + time.selects,
+        scan_us=time.us,
+        full_us=time.full_us,
+        rows_us=tuple(
+            stream.period_us
+            for stream, read in zip(harness.streams, scan.streams, strict=True)
+            if read.switches or read.levels
+        ),
+        sensors=len(manifest.joints),
+        glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),
+        rates=manifest.rates,
+        faults=manifest.faults,
+        detection=manifest.detection,
+    )
 
 
 class SwitchReader(Struct, frozen=True):
@@ -50,8 +91,7 @@ class SwitchReader(Struct, frozen=True):
 class SpecSummary(Struct, frozen=True):
     """A spec as values: the content of `spec.json`. `remarks` are sentences for whoever builds the glove.
 
-    kept      the numbers of kept sensors, in words; sensors: those of them that are wired
-    expected  sentences on times, which are calculated from bus arithmetic, and on the accuracy of the build
+    kept  the numbers of kept sensors, in words; sensors: those of them that are wired
     """
 
     glove: str
@@ -63,19 +103,22 @@ class SpecSummary(Struct, frozen=True):
     readers: tuple[SwitchReader, ...]
     wires: tuple[GloveWire, ...]
     materials: tuple[BillLine, ...]
-    expected: tuple[str, ...]
+    expected: ExpectedPerformance
     remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GloveSpec:
-    """A reduced glove: its summary, wiring, circuit and pattern, None if the positions are unknown."""
+    """A reduced glove: its summary, drawing, circuit and firmware, and the facts of the build as it is wired. pattern
+    is None if the positions are unknown.
+    """
 
     summary: SpecSummary
     harness: Harness
     scan: ScanMap
     circuit: Circuit
     pattern: Pattern | None
+    facts: tuple[Fact, ...]
 
 
 def glove_spec(
@@ -132,10 +175,10 @@ def glove_spec(
             *bill_of(circuit, wires, bought),
             *bill_of_joints([joint for joint in joints if joint not in bought], wired.cyberglove is not None),
         ),
-        expected=tuple(sentence(str(fact)) for fact in facts(manifest, read, wired) if fact.topic in _EXPECTED),
+        expected=expected_of(manifest, read, wired),
         remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(wired)),
     )
-    return GloveSpec(summary, wired, read, circuit, pattern)
+    return GloveSpec(summary, wired, read, circuit, pattern, facts(manifest, read, wired))
 
 
 def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> Harness:
