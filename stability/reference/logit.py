@@ -1,6 +1,6 @@
 """The derivatives of a multinomial logit's penalised loss at 60 digits, from the formula alone.
 
-loss = sum over frames i of log sum_k e^F_ik - F_iy + 1/2 sum of pull |row|^2 + 1/2 smoothness |next - row|^2
+loss = sum over frames i of (log sum_k e^F_ik - F_iy) + 1/2 sum of pull |row|^2 + 1/2 smoothness |next - row|^2
 
 Sums are exact, in whole units of 2^-256; only probabilities are rounded before.
 """
@@ -41,11 +41,10 @@ def largest_derivative(columns: Sequence[ReferenceColumn], labels: Sequence[int]
     residuals: dict[tuple[object, ...], list[int]] = {}
     nothing = [0] * len(columns[0].rows[0])
     for frame in zip(*(column.added for column in columns), labels, strict=True):
-        *where, label = frame
-        places = [(number, row) for number, row in enumerate(where) if row >= 0]
+        places = [(number, row) for number, row in enumerate(frame[:-1]) if row >= 0]
         if frame not in residuals:
             scores = list(map(sum, zip(nothing, *(rows[number][row] for number, row in places), strict=True)))
-            residuals[frame] = _residual(scores, label)
+            residuals[frame] = _residual(scores, frame[-1])
         for number, row in places:
             sums[number][row] = list(map(add, sums[number][row], residuals[frame]))
     largest = max(abs(total) for totals in sums for row in totals for total in row)
