@@ -11,14 +11,8 @@ from thenar.drivers.errors import SettingError
 from thenar.drivers.names import fault
 from thenar.runtime.calibration import load_calibration
 
-VALUES = st.floats(-1e6, 1e6)
-LINES = st.builds(
-    lambda name, raws, value_a, value_b: SensorCalibration(name, raws[0], value_a, raws[1], value_b),
-    st.text().filter(lambda name: not fault(name)),
-    st.lists(st.integers(1, 255), min_size=2, max_size=2, unique=True),
-    VALUES,
-    VALUES,
-)
+from ..drivers.test_calibration import LINES
+
 CALIBRATIONS = st.builds(
     lambda subject, lines: GloveCalibration(subject=subject, sensors=tuple(lines)),
     st.text().filter(lambda name: not name or not fault(name)),
