@@ -135,17 +135,6 @@ def test_live_ticks_follow_the_best_path_to_the_newest(
     assert tuple(decoder.finish()) == path[-lag:] * (lag > 0)
 
 
-@given(_streams(longest=7), st.integers(0, 3))
-def test_a_lag_as_long_as_the_stream_segments_the_whole(
-    stream: tuple[SegmentModel, NDArray[np.int64], NDArray[np.bool_]], more: int
-) -> None:
-    model, lanes, refused = stream
-    decoder = Decoder(model, len(lanes) + more)
-    for row, no in zip(lanes.tolist(), refused.tolist(), strict=True):
-        assert decoder.push(row, no).state == model.n_types
-    assert decoder.finish() == decoded(model, lanes, refused)
-
-
 def test_without_durations_it_is_a_textbooks_viterbi_on_a_long_stream() -> None:
     random = np.random.default_rng(1)
     n_types, ticks = 4, 3000

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from msgspec import json
 
-from thenar.runtime.published import LiveGrasp, Preshape
+from thenar.runtime.published import LiveGrasp
 from thenar.runtime.sinks import Fanout, GraspLine, JsonLines, SinkError, open_sink
 
 MakeGrasp = Callable[..., LiveGrasp]
@@ -20,16 +20,6 @@ MakeGrasp = Callable[..., LiveGrasp]
 
 def numbers(data: bytes) -> list[int]:
     return [json.decode(line, type=GraspLine).number for line in data.splitlines()]
-
-
-def test_every_frame_is_a_line(make_grasp: MakeGrasp, preshape: Preshape) -> None:
-    file = io.BytesIO()
-    sink = JsonLines(file)
-    for number in range(5):
-        sink.publish(make_grasp(number), preshape, None)
-    sink.close()
-    assert numbers(file.getvalue()) == list(range(5))
-    assert sink.report().sent == 5
 
 
 def test_a_file_on_disk_grows_and_keeps_what_it_has(make_grasp: MakeGrasp, tmp_path: Path) -> None:
