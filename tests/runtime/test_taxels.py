@@ -23,7 +23,7 @@ from ..gloves import pad_line
 
 COUNTS = Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0)
 NEWTONS = Calibration(0, "pad", "N", 10, 0.0, 210, 2.0)
-RISING, FALLING = pad_line("pad", 100, 900), pad_line("pad", 900, 100)
+RISING = pad_line("pad", 100, 900)
 
 counts = st.integers(0, 65535)
 

@@ -27,6 +27,16 @@ def running(rig: MakeRig, chips: list[tuple[Any, ...]] = TWO, levels: list[int] 
     return glove
 
 
+def begun(rig: MakeRig, *fault: Any, **how: Any) -> Any:
+    """Open and prepare a bus that has a fault by then."""
+    glove = rig(*TWO, opened=False, **how)
+    glove.emulated.set_all([LEVELS])
+    glove.emulated.fault(0, *fault)
+    glove.client.ask("open")
+    glove.client.ask("prepare", BOTH)
+    return glove
+
+
 def recovers(glove: Any, levels: list[int], *, by_way_of: list[list[int | None]]) -> None:
     """The right answer comes back, and before it only answers out of `by_way_of`."""
     met = glove.client.ask("read_until", levels, RECOVERY_S)
@@ -93,11 +103,7 @@ def test_an_adapter_that_refuses_batches_while_running_is_asked_for_less(rig: Ma
 
 
 def test_an_address_claimed_by_a_kernel_driver_is_left_alone(rig: MakeRig) -> None:
-    glove = rig(*TWO, opened=False)
-    glove.emulated.set_all([LEVELS])
-    glove.emulated.fault(0, "claim", 0x20)
-    glove.client.ask("open")
-    glove.client.ask("prepare", BOTH)
+    glove = begun(rig, "claim", 0x20)
     assert glove.client.ask("read") == [None, LEVELS[1]]
     assert "a kernel driver has the address" in glove.client.state().chips[0].last_error
     assert not any(place[0] == 0x20 for place in glove.traffic())
@@ -140,11 +146,7 @@ def test_a_chip_that_waits_amid_a_byte_is_clocked_free(rig: MakeRig, adapter: st
 
 @pytest.mark.parametrize("adapter", ["any", "i2c-gpio"])
 def test_a_line_held_low_at_open_is_reported_without_error(rig: MakeRig, adapter: str) -> None:
-    glove = rig(*TWO, adapter=adapter, opened=False)
-    glove.emulated.set_all([LEVELS])
-    glove.emulated.fault(0, "hold_sda")
-    glove.client.ask("open")
-    glove.client.ask("prepare", BOTH)
+    glove = begun(rig, "hold_sda", adapter=adapter)
     assert glove.client.ask("read") == [None, None]
     assert "is stuck" in glove.client.state().fault_message
     glove.emulated.fault(0, "heal")
@@ -274,20 +276,12 @@ def test_an_unusual_errno_for_a_nak_is_no_stuck_bus(rig: MakeRig) -> None:
 
 @pytest.mark.parametrize("leftover", [0x80, 0xA0, 0x20])
 def test_a_chip_that_a_crash_left_in_another_bank_is_read_rightly(rig: MakeRig, leftover: int) -> None:
-    glove = rig(*TWO, opened=False)
-    glove.emulated.set_all([LEVELS])
-    glove.emulated.fault(0, "poke", 0, 0x0A, leftover)
-    glove.client.ask("open")
-    glove.client.ask("prepare", BOTH)
+    glove = begun(rig, "poke", 0, 0x0A, leftover)
     assert glove.client.ask("read") == LEVELS
 
 
 def test_a_chip_absent_at_open_is_used_once_it_comes(rig: MakeRig) -> None:
-    glove = rig(*TWO, opened=False)
-    glove.emulated.set_all([LEVELS])
-    glove.emulated.fault(0, "remove", 0)
-    glove.client.ask("open")
-    glove.client.ask("prepare", BOTH)
+    glove = begun(rig, "remove", 0)
     assert glove.client.ask("read") == [None, LEVELS[1]]
     glove.emulated.fault(0, "heal")
     recovers(glove, LEVELS, by_way_of=[[None, LEVELS[1]]])

@@ -19,7 +19,6 @@ from thenar.runtime.published import NONE, LiveGrasp
 MakeBuild = Callable[..., Build]
 
 SWITCHES = 6
-PORTS = (0b000011, 0b001100, 0b110000)
 PERIOD = 1000
 # Of 6 switches 2 to 4 are closed in a grasp.
 CLOSED = (2, 4)

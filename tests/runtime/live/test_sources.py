@@ -195,6 +195,14 @@ def test_a_parts_inputs_are_lost_when_its_frame_expires(
     assert joined(5, [LOW, HIGH], frames, now) == SwitchFrame(max(read_us), 0b0001 * low | 0b1000 * high, lost)
 
 
+def test_a_frame_from_the_future_expires_from_its_arrival(joined: Joined) -> None:
+    frames = [(100, 0, SwitchFrame(10**9, 0b01), LONGEST_US)]
+    for now, lost in ((100 + LONGEST_US, 0), (101 + LONGEST_US, LOW)):
+        found = joined(2, [LOW], frames, now)
+        assert found is not None
+        assert found.lost == lost
+
+
 def test_a_part_that_has_not_come_yet_is_lost(joined: Joined) -> None:
     both = joined(5, [LOW, HIGH], [(9, 1, SwitchFrame(9, 0b1000), LONGEST_US)], 10)
     assert both == SwitchFrame(9, 0b1000, lost=LOW | NOBODYS)

@@ -70,15 +70,14 @@ def test_a_full_disk_leaves_whole_lines_alone(make_grasp: MakeGrasp, tmp_path: P
     assert (sink.report().sent, sink.report().lost) == (report.sent + 1, report.lost)
 
 
+def drain(pipe: int, into: bytearray) -> None:
+    while piece := os.read(pipe, 4096):
+        into.extend(piece)
+
+
 def test_a_slow_pipe_loses_whole_lines_and_holds_nobody_up(make_grasp: MakeGrasp) -> None:
-    ours, theirs = os.pipe()
-    read = bytearray()
-
-    def drain() -> None:
-        while piece := os.read(ours, 4096):
-            read.extend(piece)
-
-    reader = threading.Thread(target=drain)
+    (ours, theirs), read = os.pipe(), bytearray()
+    reader = threading.Thread(target=drain, args=(ours, read))
     with os.fdopen(theirs, "wb") as file:
         fanout = Fanout([JsonLines(file)], live=True)
         for number in range(5000):
@@ -96,14 +95,8 @@ def test_a_slow_pipe_loses_whole_lines_and_holds_nobody_up(make_grasp: MakeGrasp
 
 
 def test_a_replay_waits_for_its_reader_and_loses_nothing(make_grasp: MakeGrasp) -> None:
-    ours, theirs = os.pipe()
-    read = bytearray()
-
-    def drain() -> None:
-        while piece := os.read(ours, 4096):
-            read.extend(piece)
-
-    reader = threading.Thread(target=drain)
+    (ours, theirs), read = os.pipe(), bytearray()
+    reader = threading.Thread(target=drain, args=(ours, read))
     reader.start()
     with os.fdopen(theirs, "wb") as file:
         sink = JsonLines(file)
