@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
@@ -19,12 +20,18 @@ class Sort:
     rank: int = 0
 
 
+class Kind:
+    """The base of a registry of classes."""
+
+    name: ClassVar[str] = "kind"
+
+
 def write_package(folder: Path, **modules: str) -> None:
-    """Write a package of modules that define members of the class Sort."""
+    """Write a package of modules that define members of the classes Sort and Kind."""
     folder.mkdir()
     (folder / "__init__.py").touch()
     for name, text in modules.items():
-        (folder / f"{name}.py").write_text(f"from test_members import Sort\n{text}\n")
+        (folder / f"{name}.py").write_text(f"from test_members import Kind, Sort\n{text}\n")
 
 
 def write_distribution(folder: Path, name: str, kinds: Sequence[str] = ("sorts", "chips"), **points: str) -> None:
@@ -96,6 +103,15 @@ def test_an_invalid_foreign_member_is_refused_in_a_sentence(
     write_distribution(site, "somebody", b=value)
     registry = members(a="MEMBER = Sort('one')")
     with pytest.raises(SettingError, match=said):
+        list(registry)
+
+
+def test_a_foreign_class_derives_from_the_base_of_its_registry(site: Path) -> None:
+    write_package(site / "package_of_classes", own="MEMBER = type('Own', (Kind,), {'name': 'own'})")
+    (site / "other_classes.py").write_text("class Stranger: ...\n")
+    registry: Members[type[Kind]] = Members("sort", type, "package_of_classes", "thenar.sorts", base=Kind)
+    write_distribution(site, "somebody", b="other_classes:Stranger")
+    with pytest.raises(SettingError, match=r"is not a class derived from Kind: docs/how-to/extend\.md"):
         list(registry)
 
 

@@ -72,9 +72,12 @@ def test_what_would_get_lost_or_deceive_is_no_name(name: str, reason: str) -> No
     "name",
     [
         "thumb 1",
+        "=1+1",
         "مى‌خواهم",
         "क्‍ष",
+        "e\u0301",
         "👩‍🔬",
+        "Ǆ",
         "a\u00a0b",
         "a" * 200,
     ],
