@@ -9,17 +9,16 @@ from msgspec.structs import replace
 from thenar.runtime.errors import BuildError, ThenarError
 from thenar.runtime.manifest import Adapted, Compared, Fitting, Manifest, Recognised
 from thenar.runtime.manifest_file import MAX_BYTES, manifest_from_bytes, manifest_to_bytes
-from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.segmenting.model import SegmentModel
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ..tables import describe
+from .conftest import make_tables
 
 
 @pytest.fixture(scope="module")
-def manifest(make_tables: MakeTables, describe: Describe) -> Manifest:
+def manifest() -> Manifest:
     return describe(make_tables())
 
 
