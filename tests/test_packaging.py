@@ -159,30 +159,15 @@ def on_board(board: Path, code: str) -> str:
 
 
 @pytest.mark.slow
-def test_the_wheel_holds_every_module_and_no_other(board: Path) -> None:
+def test_the_wheel_holds_every_module_template_and_data_file_and_no_other(board: Path) -> None:
     listed = on_board(
         board,
         "import thenar.runtime, pathlib; r = pathlib.Path(thenar.runtime.__file__).parents[1]; "
-        "print(*sorted(p.relative_to(r).as_posix() for p in r.rglob('*.py')))",
+        "print(*sorted(p.relative_to(r).as_posix() for p in r.rglob('*') if p.is_file() and p.suffix != '.pyc'))",
     )
-    expected = []
-    for room in ROOMS:
-        expected += [p.relative_to(ROOT).as_posix() for p in (ROOT / room).rglob("*.py")]
-    assert listed.split() == sorted(expected)
-
-
-@pytest.mark.slow
-def test_the_wheel_holds_every_template_and_data_file(board: Path) -> None:
-    listed = on_board(
-        board,
-        "import thenar.runtime, pathlib; r = pathlib.Path(thenar.runtime.__file__).parents[1]; "
-        "print(*sorted(p.relative_to(r).as_posix() for p in r.rglob('*') if p.is_file() and p.suffix[:3] != '.py'))",
-    )
-    expected = []
-    for room in ROOMS:
-        beside = (p for p in (ROOT / room).rglob("*") if p.is_file() and p.suffix not in (".py", ".pyc"))
-        expected += [p.relative_to(ROOT).as_posix() for p in beside]
-    assert listed.split() == sorted(expected)
+    files = (p for room in ROOMS for p in (ROOT / room).rglob("*") if p.is_file() and p.suffix != ".pyc")
+    expected = sorted(p.relative_to(ROOT).as_posix() for p in files)
+    assert listed.split() == expected
     assert any(path.startswith("firmware_templates/") and path.endswith(".j2") for path in expected)
 
 

@@ -78,7 +78,7 @@ def test_a_sender_has_some_twenty_lines_and_says_what_to_do_next(name: str) -> N
 
 
 @pytest.mark.slow
-def test_the_python_sender_over_a_pty_is_proposed_as_what_it_is(started: Callable[..., object], tmp_path: Path) -> None:
+def test_the_python_sender_over_a_pty_is_proposed_as_what_it_is(started: Callable[..., object]) -> None:
     (near, far), (heard, port) = pty.openpty(), pty.openpty()
     for end in (far, port):
         tty.setraw(end)

@@ -130,9 +130,7 @@ def test_a_set_gives_the_same_results(
 
 
 @pytest.mark.slow
-def test_a_search_finds_the_same_accuracies(
-    tmp_path: Path, set_of: Callable[[str], Path], update_golden: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_search_finds_the_same_accuracies(tmp_path: Path, set_of: Callable[[str], Path], update_golden: bool) -> None:
     """Times are the machine's: only the accuracies of placements as they were screened are the same everywhere."""
     name = "icub"
     limits = ["--trainer", "logit", "--repeats", "1", "--finalists", "1"]

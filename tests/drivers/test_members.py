@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -34,13 +34,13 @@ def write_package(folder: Path, **modules: str) -> None:
         (folder / f"{name}.py").write_text(f"from test_members import Kind, Sort\n{text}\n")
 
 
-def write_distribution(folder: Path, name: str, **points: str) -> None:
-    """Write the metadata of a distribution with entry points, as pip does."""
+def write_distribution(folder: Path, name: str, kinds: Sequence[str] = ("sorts", "chips"), **points: str) -> None:
+    """Write the metadata of a distribution with the same entry points for some kinds of members, as pip does."""
     metadata = folder / f"{name}-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
     lines = "".join(f"{point} = {value}\n" for point, value in points.items())
-    (metadata / "entry_points.txt").write_text(f"[thenar.sorts]\n{lines}[thenar.chips]\n{lines}")
+    (metadata / "entry_points.txt").write_text("".join(f"[thenar.{kind}]\n{lines}" for kind in kinds))
 
 
 @pytest.fixture
@@ -160,26 +160,24 @@ def test_taken_and_missing_member_names_are_refused(site: Path, by_name: Members
         list(taken)
 
 
+def thenar(site: Path, *words: str) -> "subprocess.CompletedProcess[str]":
+    """Run a command where the distributions of a folder are installed."""
+    path = os.pathsep.join([str(site), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-P", "-m", "thenar.cli", *words]
+    return subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False)
+
+
 @pytest.mark.parametrize("value", ["no_such_module:MEMBER", "json:dumps"])
 def test_a_command_says_so_and_exits_with_2(tmp_path: Path, value: str) -> None:
     write_distribution(tmp_path, "somebody", odd=value)
-    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    command = [sys.executable, "-P", "-m", "thenar.cli", "compile", "--help"]
-    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False)
+    done = thenar(tmp_path, "compile", "--help")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"thenar: the I2C chip 'odd' ({value}) of another package")
     assert done.stderr.count("\n") == 1
 
 
 def test_what_is_broken_stops_no_command_that_does_not_need_it(tmp_path: Path) -> None:
-    (tmp_path / "somebody-1.0.dist-info").mkdir()
-    (tmp_path / "somebody-1.0.dist-info" / "METADATA").write_text(
-        "Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n"
-    )
     kinds = ("methods", "trainers", "targets", "chips", "sinks", "sources")
-    points = "".join(f"[thenar.{kind}]\nodd = no_such_module:MEMBER\n" for kind in kinds)
-    (tmp_path / "somebody-1.0.dist-info" / "entry_points.txt").write_text(points)
-    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
-    command = [sys.executable, "-P", "-m", "thenar.cli", "--help"]
-    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False)
+    write_distribution(tmp_path, "somebody", kinds, odd="no_such_module:MEMBER")
+    done = thenar(tmp_path, "--help")
     assert (done.returncode, done.stderr) == (0, "")

@@ -90,17 +90,6 @@ def test_no_frame_is_told_before_its_end_is_in_and_none_later(case: tuple[Parser
     assert at_once(stream) == told
 
 
-@given(streams(), streams())
-def test_what_follows_changes_nothing_of_what_came_before(
-    one: tuple[Parser, bytes], other: tuple[Parser, bytes]
-) -> None:
-    parser, stream = one
-    feed, _ = parser.make()
-    alone = feed(stream)
-    feed, _ = parser.make()
-    assert feed(stream + other[1])[: len(alone)] == alone
-
-
 @given(streams())
 def test_after_any_damage_the_second_sound_frame_is_told(case: tuple[Parser, bytes]) -> None:
     """The first may be eaten by what stands unfinished before it."""

@@ -13,6 +13,7 @@ from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.cyberglove_protocol import SENSORS_18
+from thenar.runtime.build import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import Harness
 
@@ -112,3 +113,10 @@ def make_folder(files: dict[str, bytes], folder: Path) -> Path:
     for name, content in files.items():
         (folder / name).write_bytes(content)
     return folder
+
+
+@cache
+def loaded_build() -> Build:
+    """Return the build of the grasps."""
+    with TemporaryDirectory() as folder:
+        return Build.load(make_folder(build_files(), Path(folder)))

@@ -1,20 +1,17 @@
 """Recordings of live gloves, as `thenar import`, `thenar record` and `thenar run --replay` read them."""
 
 from collections.abc import Iterator, Sequence
-from functools import cache
 from pathlib import Path
 from struct import Struct
-from tempfile import TemporaryDirectory
 
 import msgspec
-from material import GLOVE_TOML, GRASPS, SWITCHES, Format, build_files, harness, make_folder
+from material import GLOVE_TOML, GRASPS, SWITCHES, Format, harness, loaded_build
 from mutating_mcap import mcap_file
 
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.replay import replayed
 from thenar.runtime.live.system import LiveSystem
@@ -36,12 +33,6 @@ from thenar.simulator.playing.performance import of_recording
 _MESSAGE = Struct("<BQHIQQ")
 _CLOCK_NS = 1_700_000_000_000_000_000
 Message = tuple[int, int, bytes]
-
-
-@cache
-def loaded_build() -> Build:
-    with TemporaryDirectory() as folder:
-        return Build.load(make_folder(build_files(), Path(folder)))
 
 
 def _recording(session: Session, messages: Sequence[Message]) -> bytes:

@@ -1,10 +1,8 @@
 """What users write by hand, or let thenar write for them: gloves, calibrations, preshapes, scenes, postures."""
 
-from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from material import GLOVE_TOML, GRASPS, SENSORS, Format, build_files, harness, make_folder
+from material import GLOVE_TOML, GRASPS, SENSORS, Format, harness, loaded_build
 from mutating import toml_file
 
 from thenar.compiler.firmware.rows import rows_files
@@ -13,7 +11,6 @@ from thenar.compiler.placement.ports import ports_of_whole_glove
 from thenar.compiler.recordings.taxonomy import collected, published
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.runtime.build import Build
 from thenar.runtime.calibration import AngleReader, codes_of_bytes, load_calibration
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.writing import harness_to_toml
@@ -32,14 +29,8 @@ from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes import shipped
 
 
-@cache
-def _build() -> Build:
-    with TemporaryDirectory() as folder:
-        return Build.load(make_folder(build_files(), Path(folder)))
-
-
 def _kept() -> list[str]:
-    return [switch.name for switch in _build().manifest.switches]
+    return [switch.name for switch in loaded_build().manifest.switches]
 
 
 def _gloves() -> list[bytes]:
@@ -53,12 +44,12 @@ def _glove(data: bytes, folder: Path) -> None:
     found = load_harness(path)
     parse_harness(harness_to_toml(found), "written.toml")
     if any(stream.board for stream in found.streams):
-        rows_files("board", _build().manifest, found)
+        rows_files("board", loaded_build().manifest, found)
     ports_of_whole_glove(found, found.switches)
     Sources(found, found.switches, whole_scan(found, found.switches))
     scan = plan_scan(_kept(), found)
     scan_us(scan, found)
-    spec_files(_build().manifest, None, found)
+    spec_files(loaded_build().manifest, None, found)
 
 
 _FINGERS = [f"finger_{number}" for number in range(6)]

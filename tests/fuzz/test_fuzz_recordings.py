@@ -7,8 +7,9 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from material import loaded_build
 from mutating_mcap import Record, joined, mcap_file, records_of
-from of_recordings import FORMATS, STEPS, loaded_build, recognised
+from of_recordings import FORMATS, STEPS, recognised
 
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.live.replay import replayed

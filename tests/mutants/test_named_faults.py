@@ -4,6 +4,7 @@
 """
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import NamedTuple
 
 import pytest
 
-STAGE = Path(__file__).with_name("stage.py")
+ROOT = Path(__file__).resolve().parents[2]
 
 
 class Fault(NamedTuple):
@@ -149,8 +150,11 @@ FAULTS = (
 
 @pytest.fixture(scope="module")
 def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("staged")
-    subprocess.run([sys.executable, STAGE, folder], check=True)
+    """A copy of the package, its links followed, and of the tests, which is imported before the installed thenar."""
+    folder, leave_out = tmp_path_factory.mktemp("staged"), shutil.ignore_patterns("__pycache__")
+    for name, place in {"thenar": "src/thenar", "tests": "tests"}.items():
+        shutil.copytree(ROOT / place, folder / name, ignore=leave_out)
+    shutil.copy(ROOT / "pyproject.toml", folder)
     # Bytecode that names its source by content: what is as long as before, and of the same second, is compiled again.
     compiling = ("-m", "compileall", "-q", "--invalidation-mode", "checked-hash", folder / "thenar")
     subprocess.run([sys.executable, *compiling], check=True)

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.manifest import Calibration, Manifest
+from thenar.runtime.manifest import Calibration
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import IntegerTables, tables_to_bytes
 from thenar.runtime.model.terms.line import Line
@@ -24,17 +24,16 @@ from thenar.runtime.sources.base import sources_of
 from thenar.runtime.sources.rows import RowSource
 
 from ..conftest import lacking
-from ..tables import describe as _describe
+from ..tables import describe
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
 MakeBuild = Callable[..., Build]
 MakeGrasp = Callable[..., LiveGrasp]
 
 
-def _make_tables(
+def make_tables(
     seed: int = 0, classes: int = 5, switches: int = 9, joints: int = 3, bins: int = 6, slopes: int = 0
 ) -> IntegerTables:
+    """Return random tables of this size."""
     random = np.random.default_rng(seed)
 
     def rows(*shape: int) -> np.ndarray:
@@ -76,32 +75,22 @@ def row_source(glove: str) -> RowSource:
     return source
 
 
-@pytest.fixture(scope="session")
-def make_tables() -> MakeTables:
-    return _make_tables
-
-
-@pytest.fixture(scope="session")
-def describe() -> Describe:
-    return _describe
-
-
 @pytest.fixture
 def build() -> Build:
-    tables = _make_tables()
-    return Build(_describe(tables), tables)
+    tables = make_tables()
+    return Build(describe(tables), tables)
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    tables = _make_tables()
+    tables = make_tables()
     (tmp_path / TABLES_NAME).write_bytes(tables_to_bytes(tables))
-    (tmp_path / MANIFEST_NAME).write_bytes(manifest_to_bytes(_describe(tables)))
+    (tmp_path / MANIFEST_NAME).write_bytes(manifest_to_bytes(describe(tables)))
     return tmp_path
 
 
 @pytest.fixture(scope="session")
-def make_build(make_tables: MakeTables, describe: Describe) -> MakeBuild:
+def make_build() -> MakeBuild:
     """Return what makes builds whose joints are coded in a CyberGlove's bytes."""
 
     def make(seed: int = 0, classes: int = 4, switches: int = 6, joints: int = 3) -> Build:

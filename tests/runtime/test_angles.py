@@ -22,12 +22,6 @@ def test_every_byte_is_on_its_sensors_line(sensors: bytes) -> None:
     assert found.positions_rad == (math.radians(THUMB.value(sensors[0])), math.radians(INDEX.value(sensors[1])))
 
 
-def test_the_two_points_of_a_calibration_are_hit() -> None:
-    reader = AngleReader(SENSORS, GloveCalibration(subject="anna", sensors=(INDEX,)))
-    assert reader.angles(bytes((1, 96, 1))).positions_rad == (0.0,)
-    assert reader.angles(bytes((1, 161, 1))).positions_rad == pytest.approx((math.pi / 2,))
-
-
 def test_a_calibration_of_another_glove_is_refused() -> None:
     with pytest.raises(SettingError, match="has none of the glove's sensors"):
         AngleReader(("wrist_pitch",), GloveCalibration(subject="anna", sensors=(INDEX,)))

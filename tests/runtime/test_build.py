@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +9,12 @@ from msgspec.structs import replace
 from thenar.runtime import Build
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.errors import BuildError, ThenarError
-from thenar.runtime.manifest import Manifest
 from thenar.runtime.manifest_file import manifest_to_bytes
 from thenar.runtime.model.integers import MAX_BYTES, IntegerTables, tables_to_bytes
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ..tables import describe
+from .conftest import make_tables
+
 MEMBERS = [MANIFEST_NAME, TABLES_NAME]
 
 
@@ -28,7 +27,7 @@ def test_a_loaded_build_scores_and_classifies_as_the_one_written(build: Build, f
         assert loaded.classify(bits, codes) == loaded.grasps[int(scores.argmax())]
 
 
-def test_a_tie_goes_to_the_lowest_number(describe: Describe) -> None:
+def test_a_tie_goes_to_the_lowest_number() -> None:
     none = np.zeros((0, 4), np.int16)
     tables = IntegerTables.of(np.array([1, 5, 5, 2], np.int16), none, (), (), none, none, 1.0)
     assert Build(describe(tables), tables).classify([], []) == "grasp 1"
@@ -64,7 +63,7 @@ def test_mutated_files_are_refused_by_name(folder: Path, member: str, data: st.D
         path.write_bytes(good)
 
 
-def test_tables_of_another_build_are_refused(folder: Path, make_tables: MakeTables) -> None:
+def test_tables_of_another_build_are_refused(folder: Path) -> None:
     (folder / TABLES_NAME).write_bytes(tables_to_bytes(make_tables(seed=1)))
     with pytest.raises(BuildError, match=r"not the one that build\.json describes"):
         Build.load(folder)
@@ -77,7 +76,7 @@ def test_an_oversized_file_is_not_read_to_its_end(folder: Path) -> None:
         Build.load(folder)
 
 
-def test_names_and_tables_must_agree(describe: Describe, make_tables: MakeTables) -> None:
+def test_names_and_tables_must_agree() -> None:
     with pytest.raises(BuildError, match="names 5 grasp types, 9 switches and 3 joints"):
         Build(describe(make_tables()), make_tables(switches=8))
 

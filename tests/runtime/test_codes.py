@@ -45,14 +45,12 @@ def test_a_bytes_code_lies_on_the_calibrations_line(
     assert codes_of_bytes(coded, calibration) == tuple(min(max(round(code), 0), 65535) for code in line)
 
 
-def test_joints_are_picked_by_name_wherever_they_stand_on_the_wire() -> None:
-    tables = CodeTables([raw_joint("c"), raw_joint("a")], ["a", "b", "c", "d"])
-    assert tables.codes(bytes([10, 20, 30, 40])) == [30, 10]
-
-
-@pytest.mark.parametrize(("names", "expected"), [([], []), (["b"], [20]), (["b", "b2"], [20, 40])])
-def test_any_number_of_joints_has_as_many_codes(names: list[str], expected: list[int]) -> None:
-    assert CodeTables([raw_joint(name) for name in names], ["a", "b", "b2"]).codes(bytes([10, 20, 40])) == expected
+@pytest.mark.parametrize(
+    ("names", "expected"), [([], []), (["b"], [20]), (["b", "b2"], [20, 40]), (["c", "a"], [30, 10])]
+)
+def test_joints_are_picked_by_name_wherever_they_stand_on_the_wire(names: list[str], expected: list[int]) -> None:
+    tables = CodeTables([raw_joint(name) for name in names], ["a", "b", "c", "b2"])
+    assert tables.codes(bytes([10, 20, 30, 40])) == expected
 
 
 def test_halves_are_rounded_to_even_as_the_import_does() -> None:

@@ -8,14 +8,6 @@ from thenar.runtime.frames import BitRemap, Newest, SwitchFrame
 PAIRS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), unique_by=(lambda p: p[0], lambda p: p[1]))
 
 
-def test_a_frame_counts_for_its_stated_time() -> None:
-    newest = Newest[SwitchFrame]()
-    assert newest.frame is None
-    newest.take(SwitchFrame(1000, 5), 1000, 200)
-    assert newest.expires_us == 1200
-    assert newest.time_us == 1000
-
-
 @given(ahead=st.integers(0, 10**12), again=st.integers(0, 5))
 def test_a_frame_from_the_future_ages_from_when_it_came(ahead: int, again: int) -> None:
     newest = Newest[SwitchFrame]()

@@ -29,17 +29,6 @@ def grasp(name: str, health: str = "ok") -> LiveGrasp:
     return changed(known, health=health)
 
 
-def test_a_switch_that_changes_faster_than_a_hand_chatters() -> None:
-    chattering = Chattering(4)
-    for number in range(120):
-        closed = (number & 1) | (number // 10 & 1) << 1
-        chattering.frame(number * SECOND // 100, closed, 0b1111)
-    assert chattering.switches == 0b1
-    for number in range(120, 350):
-        chattering.frame(number * SECOND // 100, 0, 0b1111)
-    assert chattering.switches == 0
-
-
 def test_a_switch_recovers_while_another_still_chatters() -> None:
     chattering, found = Chattering(2), []
     for number in range(400):

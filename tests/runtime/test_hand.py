@@ -21,13 +21,15 @@ from thenar.runtime.hand import (
     load_hand,
 )
 from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
-from thenar.runtime.model.integers import IntegerTables
+
+from ..tables import describe
+from .conftest import make_tables
 
 PAD = Calibration(0, "pad", "N", 0, 0.0, 1000, 10.0)
 
 
 @pytest.fixture
-def manifest(make_tables: Callable[..., IntegerTables], describe: Callable[[IntegerTables], Manifest]) -> Manifest:
+def manifest() -> Manifest:
     """Return a build of six switches, three levels of a taxel among them, and three joints."""
     made = describe(make_tables(switches=6))
     levels = tuple(Switch(6, f"pad>{code}", 0.1, Threshold(code, code / 100, PAD)) for code in (500, 90, 200))

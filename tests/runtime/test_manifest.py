@@ -6,20 +6,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.runtime.errors import BuildError, ThenarError
+from thenar.runtime.errors import BuildError
 from thenar.runtime.manifest import Adapted, Compared, Fitting, Manifest, Recognised
 from thenar.runtime.manifest_file import MAX_BYTES, manifest_from_bytes, manifest_to_bytes
-from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.published import NONE
 from thenar.runtime.recipe import Recipe
 from thenar.runtime.segmenting.model import SegmentModel
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ..tables import describe
+from .conftest import make_tables
 
 
 @pytest.fixture(scope="module")
-def manifest(make_tables: MakeTables, describe: Describe) -> Manifest:
+def manifest() -> Manifest:
     return describe(make_tables())
 
 
@@ -75,27 +74,6 @@ def test_any_changed_byte_is_refused(manifest: Manifest, data: st.DataObject) ->
     document[position] = data.draw(st.integers(0, 255).filter(lambda byte: byte != document[position]))
     with pytest.raises(BuildError):
         manifest_from_bytes(bytes(document))
-
-
-@given(st.binary(max_size=300) | st.text(alphabet='{}[]":,0123456789schema \\un', max_size=300).map(str.encode))
-def test_random_bytes_are_refused(data: bytes) -> None:
-    with pytest.raises(ThenarError):
-        manifest_from_bytes(data)
-
-
-json_values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
-    max_leaves=6,
-)
-
-
-@given(data=st.data(), value=json_values)
-def test_any_field_may_hold_anything_and_is_refused(manifest: Manifest, data: st.DataObject, value: object) -> None:
-    document = json.loads(manifest_to_bytes(manifest))
-    document[data.draw(st.sampled_from(sorted(document)))] = value
-    with pytest.raises(BuildError):
-        manifest_from_bytes(json.dumps(document).encode())
 
 
 def test_another_schema_is_refused_by_its_number_whatever_else_it_holds() -> None:

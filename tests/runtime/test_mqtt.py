@@ -19,7 +19,7 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.stream_probe import reader_of
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
-from thenar.runtime.sinks import Fanout, GraspLine, HeaderLine, Line, SinkError, open_sink
+from thenar.runtime.sinks import GraspLine, HeaderLine, Line, SinkError, open_sink
 from thenar.runtime.sinks.jsonl import encode, encode_header, encode_health
 from thenar.runtime.sources.mqtt import MqttReader
 
@@ -116,19 +116,6 @@ def test_lines_are_those_of_json_lines_and_joints_are_kept_for_late_readers(
         assert late.got.get(timeout=WAIT_S)[0] == "lab/left/grasp"
     sink.close()
     assert (sink.report().sent, sink.report().lost, sink.report().error) == (4, 0, "")
-
-
-@pytest.mark.parametrize(("options", "numbers"), [("?on=change", [0, 40]), ("?rate=5", [0, 20, 40, 60, 80])])
-def test_it_takes_the_paces_of_all_sinks(
-    broker: Broker, make_grasp: MakeGrasp, options: str, numbers: list[int]
-) -> None:
-    with Other(broker, "hand/grasp") as reader:
-        fanout = Fanout([open_sink(f"{broker.place}/hand{options}")], live=True)
-        for number in range(100):
-            fanout.publish(make_grasp(number, "PoS" if number < 40 else "cup"), None, None)
-        fanout.close()
-        assert [json.loads(reader.got.get(timeout=WAIT_S)[1])["number"] for _ in numbers] == numbers
-        assert reader.got.empty()
 
 
 def test_what_comes_while_the_broker_is_away_is_lost_and_what_comes_later_is_not(

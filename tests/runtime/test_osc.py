@@ -14,17 +14,14 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.live.stream_probe import propose_glove
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
-from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sinks import open_sink
-from thenar.runtime.sources.base import sources_of
 from thenar.runtime.sources.osc import OscParser, OscReader
 from thenar.runtime.sources.rows import RowSource
 
 from ..sending import datagrams, free_port
-from .conftest import eventually
+from .conftest import eventually, row_source
 
 GLOVE = """
 [debounce]
@@ -97,13 +94,7 @@ def test_nobody_has_to_receive_and_what_is_too_long_is_lost(
 
 @pytest.fixture
 def source() -> Iterator[RowSource]:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    harness = parse_harness(GLOVE.format(port=f"osc:127.0.0.1:{port}/glove"), "glove.toml")
-    scan = whole_scan(harness, harness.switches)
-    (made,) = sources_of(harness, harness.switches, scan)
-    assert isinstance(made, RowSource)
+    made = row_source(GLOVE.format(port=f"osc:127.0.0.1:{free_port()}/glove"))
     made.open()
     yield made
     made.close()

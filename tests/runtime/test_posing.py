@@ -1,12 +1,10 @@
 import pytest
 
-from thenar.drivers.calibration import FLAT, POSES
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.frames import OLD_US
 from thenar.runtime.posing import SETTLE_US, PoseGuide, PoseStage
 
 HOLD_US = 1_000_000
-ALL = (FLAT, *POSES)
 
 
 @pytest.fixture

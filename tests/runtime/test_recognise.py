@@ -1,7 +1,6 @@
 """What a build recognises in one frame."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,16 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime import Build
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 
-MakeTables = Callable[..., IntegerTables]
-Describe = Callable[[IntegerTables], Manifest]
+from ..tables import describe
+from .conftest import make_tables
+
 Frame = tuple[np.ndarray, np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def loaded(make_tables: MakeTables, describe: Describe) -> Build:
+def loaded() -> Build:
     tables = make_tables()
     return Build(describe(tables), tables)
 

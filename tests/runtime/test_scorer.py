@@ -1,8 +1,8 @@
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
@@ -10,7 +10,8 @@ from thenar.runtime.errors import FrameError
 from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 
-MakeTables = Callable[..., IntegerTables]
+from .conftest import make_tables
+
 Drawn = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -41,9 +42,7 @@ def frames(draw: st.DrawFn, switches: int, joints: int) -> Drawn:
 
 
 @given(data=st.data(), seed=st.integers(0, 50), switches=st.integers(0, 12), joints=st.integers(0, 4))
-def test_scores_are_the_sum_of_the_rows(
-    make_tables: MakeTables, data: st.DataObject, seed: int, switches: int, joints: int
-) -> None:
+def test_scores_are_the_sum_of_the_rows(data: st.DataObject, seed: int, switches: int, joints: int) -> None:
     tables = make_tables(seed, switches=switches, joints=joints)
     bits, codes, lost_bits, lost_codes = data.draw(frames(switches, joints))
     scorer, none = Scorer(tables), [False] * (switches + joints)
@@ -53,7 +52,7 @@ def test_scores_are_the_sum_of_the_rows(
     assert np.array_equal(degraded, summed(tables, bits, codes, lost_bits, lost_codes))
 
 
-def test_a_code_equal_to_a_threshold_goes_left_of_it(make_tables: MakeTables) -> None:
+def test_a_code_equal_to_a_threshold_goes_left_of_it() -> None:
     tables = make_tables(switches=0, joints=1)
     threshold = int(tables.thresholds[0][2])
     scorer = Scorer(tables)
@@ -73,7 +72,7 @@ def test_lanes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [np.uint16, np.uint8, np.int32, np.int64, list])
-def test_codes_may_come_in_any_integers(make_tables: MakeTables, kind: type) -> None:
+def test_codes_may_come_in_any_integers(kind: type) -> None:
     scorer, codes = Scorer(make_tables()), [3, 200, 77]
     given_codes: ArrayLike = codes if kind is list else np.array(codes, kind)
     assert scorer.biased_scores([0, 1] * 4 + [1], given_codes) == scorer.biased_scores(
@@ -95,9 +94,7 @@ def test_codes_may_come_in_any_integers(make_tables: MakeTables, kind: type) -> 
         (np.zeros(9, bool), ["a", "b", "c"], "codes must be integers"),
     ],
 )
-def test_a_frame_that_does_not_fit_is_refused(
-    make_tables: MakeTables, bits: ArrayLike, codes: ArrayLike, reason: str
-) -> None:
+def test_a_frame_that_does_not_fit_is_refused(bits: ArrayLike, codes: ArrayLike, reason: str) -> None:
     with pytest.raises(FrameError, match=reason):
         Scorer(make_tables()).biased_scores(bits, codes)
 
@@ -110,14 +107,12 @@ def test_a_frame_that_does_not_fit_is_refused(
         ([3] + [0] * 8, np.zeros(3, bool), "^lost switches must be 0 or 1, but this frame has 3$"),
     ],
 )
-def test_a_mask_that_does_not_fit_is_named(
-    make_tables: MakeTables, lost_bits: ArrayLike, lost_codes: ArrayLike, reason: str
-) -> None:
+def test_a_mask_that_does_not_fit_is_named(lost_bits: ArrayLike, lost_codes: ArrayLike, reason: str) -> None:
     with pytest.raises(FrameError, match=reason):
         Scorer(make_tables()).biased_scores_without(np.zeros(9, bool), [0, 0, 0], lost_bits, lost_codes)
 
 
-def test_every_code_has_its_bins_row_also_when_cached(make_tables: MakeTables) -> None:
+def test_every_code_has_its_bins_row_also_when_cached() -> None:
     tables = make_tables(3, switches=0, joints=2)
     scorer, codes = Scorer(tables), np.arange(0, 65536, 7)
     bins = np.searchsorted(tables.thresholds[0], codes)
@@ -125,3 +120,49 @@ def test_every_code_has_its_bins_row_also_when_cached(make_tables: MakeTables) -
     for _ in range(2):
         found = [scorer.biased_scores([], np.array([code, 0], np.uint16)) for code in codes]
         assert np.array_equal(np.array(found) - LANE_OFFSET, expected)
+
+
+def flags(mask: int, count: int) -> np.ndarray:
+    return np.array([mask >> bit & 1 for bit in range(count)], bool)
+
+
+@pytest.mark.parametrize(("classes", "switches", "joints"), [(5, 9, 3), (2, 0, 2), (14, 40, 16), (3, 4, 0), (4, 5, 1)])
+@settings(deadline=None)
+@given(data=st.data())
+def test_any_state_has_the_scores_of_the_whole_frame(
+    data: st.DataObject, classes: int, switches: int, joints: int
+) -> None:
+    tables, masks = make_tables(3, classes, switches, joints), st.integers(0, (1 << switches) - 1)
+    scorer = Scorer(tables)
+    closed, lost = data.draw(masks), data.draw(st.just(0) | masks)
+    several = st.lists(st.integers(0, 260) | st.just(65535), min_size=joints, max_size=joints)
+    codes, lost_joints = data.draw(st.none() | several), data.draw(st.just(0) | st.integers(0, (1 << joints) - 1))
+    absent = np.full(joints, True) if codes is None else flags(lost_joints, joints)
+    measured = np.array([0] * joints if codes is None else codes, np.uint16)
+    expected = summed(tables, flags(closed, switches), measured, flags(lost, switches), absent)
+    found = np.array(scorer.state_scores(closed, lost, codes, lost_joints)) - LANE_OFFSET
+    assert found.tolist() == expected.tolist()
+
+
+@pytest.mark.parametrize("sign", [+1, -1])
+def test_changes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
+    def rows(*values: int) -> np.ndarray:
+        return np.array(values, np.int16).reshape(-1, 2) * np.int16(sign)
+
+    tables = IntegerTables.of(rows(0, 7)[0], rows(32767, -32760), (), (), rows(-1, 1), rows(), 1.0)
+    scorer = Scorer(tables)
+    for closed, lost in [(1, 0), (0, 1), (1, 1), (0, 0), (1, 0)]:
+        row = tables.switch_means[0] if lost else closed * tables.switch_rows[0]
+        assert scorer.state_scores(closed, lost, []) == tuple((tables.bias.astype(int) + row + LANE_OFFSET).tolist())
+
+
+@pytest.mark.parametrize(("closed", "lost"), [(1 << 9, 0), (0, 1 << 9), (-1, 0), (0, -1)])
+def test_a_switch_that_the_build_does_not_have_is_refused(closed: int, lost: int) -> None:
+    with pytest.raises(FrameError, match="beyond the 9 of the build"):
+        Scorer(make_tables()).state_scores(closed, lost, None)
+
+
+@pytest.mark.parametrize("codes", [[], [1, 2], [1, 2, 3, 4]])
+def test_codes_of_another_glove_are_refused(codes: list[int]) -> None:
+    with pytest.raises(FrameError, match="the build has 3 joints"):
+        Scorer(make_tables()).state_scores(0, 0, codes)

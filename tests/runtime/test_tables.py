@@ -1,6 +1,5 @@
 import contextlib
 import struct
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -25,8 +24,8 @@ from thenar.runtime.model.terms.line import Line
 from thenar.runtime.sealed import HEADER, seal
 
 from ..conftest import peak_bytes
+from .conftest import make_tables
 
-MakeTables = Callable[..., IntegerTables]
 Size = dict[str, int]
 
 sizes = st.fixed_dictionaries(
@@ -46,7 +45,7 @@ def _payload(tables: IntegerTables) -> bytearray:
 
 
 @given(size=sizes)
-def test_what_was_written_is_read_again(make_tables: MakeTables, size: Size) -> None:
+def test_what_was_written_is_read_again(size: Size) -> None:
     data = tables_to_bytes(make_tables(**size))
     assert tables_to_bytes(tables_from_bytes(data)) == data
 
@@ -86,7 +85,7 @@ def test_a_slope_that_fits_no_byte_is_refused(ends: tuple[int, int, int]) -> Non
         Line(0, low, high, np.zeros(2, np.int8), gain)
 
 
-def test_slopes_of_other_joints_or_shapes_are_refused(make_tables: MakeTables) -> None:
+def test_slopes_of_other_joints_or_shapes_are_refused() -> None:
     tables = make_tables(slopes=2)
     for joints in ((1, 0), (0, 0), (0, 3)):
         with pytest.raises(BuildError, match="they must rise"):
@@ -97,7 +96,7 @@ def test_slopes_of_other_joints_or_shapes_are_refused(make_tables: MakeTables) -
         tables.changed(further=(replace(tables.lines[0], row=np.zeros(4, np.int8)),))
 
 
-def test_a_slope_that_could_overflow_is_refused(make_tables: MakeTables) -> None:
+def test_a_slope_that_could_overflow_is_refused() -> None:
     slopes = (Line(0, 0, 254, np.full(5, 127, np.int8), 0),)
     assert make_tables().changed(further=slopes).bound > 127 * 127
     two = (*slopes, replace(slopes[0], joint=1), replace(slopes[0], joint=2))
@@ -106,7 +105,7 @@ def test_a_slope_that_could_overflow_is_refused(make_tables: MakeTables) -> None
 
 
 @given(size=sizes, data=st.data())
-def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables: MakeTables, size: Size, data: st.DataObject) -> None:
+def test_no_partial_sum_of_any_frame_leaves_the_bound(size: Size, data: st.DataObject) -> None:
     tables = make_tables(**size)
     terms = [tables.bias]
     for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
@@ -120,7 +119,7 @@ def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables: MakeTables, s
     assert np.abs(np.cumsum(np.array(order, np.int64), axis=0)).max() <= tables.bound
 
 
-def test_a_tampered_table_that_could_overflow_is_refused(make_tables: MakeTables) -> None:
+def test_a_tampered_table_that_could_overflow_is_refused() -> None:
     tables = make_tables()
     payload = _payload(tables)
     start = 16 + 2 * tables.n_joints
@@ -129,19 +128,19 @@ def test_a_tampered_table_that_could_overflow_is_refused(make_tables: MakeTables
         tables_from_bytes(seal(KIND, 1, bytes(payload)))
 
 
-def test_the_most_negative_integer_does_not_slip_through(make_tables: MakeTables) -> None:
+def test_the_most_negative_integer_does_not_slip_through() -> None:
     tables = make_tables(switches=0, joints=0)
     with pytest.raises(BuildError, match="a sum could reach 32768"):
         tables.changed(bias=np.full(5, -32768, np.int16))
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), 1e308, 2.0**31])
-def test_a_scale_that_is_no_scale_is_refused(make_tables: MakeTables, scale: float) -> None:
+def test_a_scale_that_is_no_scale_is_refused(scale: float) -> None:
     with pytest.raises(BuildError, match="scale"):
         replace(make_tables(), scale=scale)
 
 
-def test_a_file_holds_no_coarser_scale_than_an_ensemble_can_need(make_tables: MakeTables) -> None:
+def test_a_file_holds_no_coarser_scale_than_an_ensemble_can_need() -> None:
     data = tables_to_bytes(replace(make_tables(), scale=COARSEST_SCALE))
     assert tables_from_bytes(data).scale == COARSEST_SCALE
     with pytest.raises(BuildError, match="at least 2"):
@@ -152,7 +151,7 @@ def test_a_file_holds_no_coarser_scale_than_an_ensemble_can_need(make_tables: Ma
 
 
 @pytest.mark.parametrize("change", [{"bias": np.zeros(4, np.int16)}, {"bias": np.zeros(5)}, {"joint_rows": ()}])
-def test_arrays_that_do_not_belong_together_are_refused(make_tables: MakeTables, change: dict[str, Any]) -> None:
+def test_arrays_that_do_not_belong_together_are_refused(change: dict[str, Any]) -> None:
     with pytest.raises(BuildError):
         make_tables().changed(**change)
 
@@ -168,9 +167,7 @@ def test_arrays_that_do_not_belong_together_are_refused(make_tables: MakeTables,
         (6, 1, "offset 6"),
     ],
 )
-def test_counts_are_held_against_their_caps_and_the_length(
-    make_tables: MakeTables, offset: int, count: int, reason: str
-) -> None:
+def test_counts_are_held_against_their_caps_and_the_length(offset: int, count: int, reason: str) -> None:
     payload = _payload(make_tables())
     payload[offset : offset + 2] = count.to_bytes(2, "little")
     with pytest.raises(BuildError, match=reason):
@@ -187,7 +184,7 @@ def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: byte
 
 
 @given(size=sizes, data=st.data())
-def test_mutated_content_is_read_or_refused(make_tables: MakeTables, size: Size, data: st.DataObject) -> None:
+def test_mutated_content_is_read_or_refused(size: Size, data: st.DataObject) -> None:
     made = make_tables(**size)
     payload, version = _payload(made), SLOPED if made.lines else PLAIN
     for _ in range(data.draw(st.integers(1, 4))):
@@ -199,15 +196,13 @@ def test_mutated_content_is_read_or_refused(make_tables: MakeTables, size: Size,
     assert tables_to_bytes(tables)[56:] == bytes(payload)
 
 
-def test_counts_without_the_thresholds_counts_they_announce_are_refused(make_tables: MakeTables) -> None:
+def test_counts_without_the_thresholds_counts_they_announce_are_refused() -> None:
     for length in (15, 16, 21):
         with pytest.raises(BuildError, match=f"{length} bytes of content"):
             tables_from_bytes(seal(KIND, 1, bytes(_payload(make_tables())[:length])))
 
 
-def test_a_file_may_be_as_large_as_the_largest_allowed(
-    make_tables: MakeTables, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_may_be_as_large_as_the_largest_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     made = make_tables()
     data = tables_to_bytes(made)
     monkeypatch.setattr(module, "MAX_BYTES", len(data))
@@ -220,7 +215,7 @@ def test_a_file_may_be_as_large_as_the_largest_allowed(
 
 
 @pytest.mark.parametrize("name", ["bias", "switch_rows", "switch_means", "joint_means"])
-def test_an_array_of_another_type_is_named(make_tables: MakeTables, name: str) -> None:
+def test_an_array_of_another_type_is_named(name: str) -> None:
     made = make_tables()
     with pytest.raises(BuildError, match=rf"^{name}(\[0\])? is int32 "):
         made.changed(**{name: getattr(made, name).astype(np.int32)})

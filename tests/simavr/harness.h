@@ -3,10 +3,12 @@
 #define THENAR_HARNESS_H
 
 #include <stdint.h>
+#include <stdnoreturn.h>
 
 #include <simavr/sim_avr.h>
 
-#include "fail.h"
+/* Print one line to stderr, after the program's name, and exit with code 2. */
+noreturn void fail(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* Return `text` as a number, decimal or 0x..., or fail and say that it should have been `what`. */
 uint32_t number(const char *text, const char *what);

@@ -213,9 +213,6 @@ def test_quantiles_in_closed_form() -> None:
     assert normal_quantile(0.5) == 0
 
 
-WHOLE = st.integers(-9, 9).map(float)
-
-
 @given(st.lists(st.floats(0.1, 9), min_size=3, max_size=3), st.floats(-7, 7))
 def test_a_turn_keeps_its_axis_and_all_lengths(axis: list[float], angle: float) -> None:
     rows = turn(axis, angle)

@@ -89,10 +89,6 @@ def test_while_it_streams_it_hears_nothing_but_a_ctrl_c() -> None:
     assert not one.streaming
 
 
-def test_a_record_is_a_byte_a_sensor() -> None:
-    assert box().record() == b"S" + VALUES + b"\0"
-
-
 def test_status_stands_between_sensors_and_fault() -> None:
     one = box()
     one.feed(b"U\x01")

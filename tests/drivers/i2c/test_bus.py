@@ -143,7 +143,7 @@ def test_two_chips_that_would_answer_at_one_address_are_refused() -> None:
             I2cBus("/dev/i2c-7", [at(route)])
 
 
-def test_a_missing_or_wrong_bus_says_what_to_check(tmp_path: Any) -> None:
+def test_a_missing_or_wrong_bus_says_what_to_check() -> None:
     with pytest.raises(DeviceError, match=r"/dev/i2c-99 cannot be opened: there is no such bus.*plugged in"):
         I2cBus("/dev/i2c-99", []).open()
     with pytest.raises(DeviceError, match="is it an I2C device"):

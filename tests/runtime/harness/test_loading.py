@@ -56,15 +56,8 @@ def test_stored_text_is_read_with_its_calibration_path_unchanged(full_text: str)
 def test_the_calibration_of_taxels_counts_from_the_folder_too(load: Load, tmp_path: Path) -> None:
     settings = load('[taxels]\ncalibration = "pads.toml"').taxel_settings
     assert settings == TaxelSettings(calibration=str(tmp_path / "pads.toml"))
-    assert load('[taxels]\ncalibration = "/pads.toml"').taxel_settings.calibration == "/pads.toml"
     with pytest.raises(HarnessError, match="drift"):
         load("[taxels]\ndrift = 0.2")
-
-
-def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> None:
-    glove = load('[cyberglove]\nport = "x"\ncalibration = "/somewhere/anna.toml"').cyberglove
-    assert glove is not None
-    assert glove.calibration == "/somewhere/anna.toml"
 
 
 @pytest.mark.parametrize(
@@ -80,10 +73,7 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
             "[[stream]]\nport = 'socket://a:1?x'\nswitches = ['a']",
             "port: 'socket://a:1?x' is not the address of a line",
         ),
-        *(
-            (f"[[stream]]\nport = '{port}'", f"line 2: stream[0].port: '{port}' is not a supported port")
-            for port in ("spy:///dev/null?file=a", "alt://a?class=b", "loop://", "hwgrep://a")
-        ),
+        ("[[stream]]\nport = 'loop://'", "line 2: stream[0].port: 'loop://' is not a supported port"),
         ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is not the path of a device, such as"),
         ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is not the path of a device"),
         ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),

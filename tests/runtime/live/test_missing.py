@@ -5,10 +5,8 @@ import pytest
 
 from thenar.runtime import Build
 from thenar.runtime.live.recogniser import MissingInputs, weights
-from thenar.runtime.model.integers import IntegerTables
 
 MakeBuild = Callable[..., Build]
-MakeTables = Callable[..., IntegerTables]
 
 
 def weighted(build: Build) -> Build:

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from thenar.runtime import Build
 from thenar.runtime.frames import SwitchFrame
-from thenar.runtime.live.decision import Ranking
 from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.manifest import Rejection
 from thenar.runtime.policy import Policy
@@ -20,7 +19,6 @@ from thenar.runtime.published import NONE, LiveGrasp
 MakeBuild = Callable[..., Build]
 
 SWITCHES = 6
-PORTS = (0b000011, 0b001100, 0b110000)
 PERIOD = 1000
 # Of 6 switches 2 to 4 are closed in a grasp.
 CLOSED = (2, 4)
@@ -120,19 +118,3 @@ def test_a_lost_switch_is_not_counted_as_closed(build: Build) -> None:
     assert (found.grasp != NONE, found.degraded) == (True, True)
     assert build.recognise(flags(0b000011), [], lost_switches=np.array(flags(0b111100))).grasp != NONE
     assert build.recognise(flags(0b000001), [], lost_switches=lost & False).grasp == NONE
-
-
-@given(st.data())
-def test_with_none_a_standing_is_that_of_one_more_class(make_build: MakeBuild, data: st.DataObject) -> None:
-    build = make_build(data.draw(st.integers(0, 9)), joints=0)
-    lead = data.draw(st.integers(-40, 40))
-    lanes = build.scorer.biased_scores(np.array([data.draw(st.booleans()) for _ in range(6)]), [])
-    plain = Ranking(lanes)
-    both, none = Ranking((*lanes, max(lanes) + lead)), len(lanes)
-    assert both.candidate == (none if lead > 0 else plain.candidate)
-    assert both.biased_scores[none] - max(lanes) == lead
-    for held in range(none):
-        if lead <= 0:
-            assert both.lead(held) == plain.lead(held)
-            assert both.contradicts(held, 5) == plain.contradicts(held, 5)
-    assert both.contradicts(none, 5) == (lead <= -5)

@@ -1,14 +1,11 @@
 import os
 from collections.abc import Callable
-from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from struct import pack
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -184,21 +181,6 @@ def test_what_follows_the_end_is_told(recording: Path) -> None:
         f"whole.mcap is whole up to byte {size} of {size + 4}, the rest was left out: "
         "bytes follow the end of the recording"
     ]
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None)
-@given(st.data())
-def test_no_damage_raises_anything_but_its_own_error(recording: Path, data: st.DataObject) -> None:
-    good = recording.read_bytes()
-    bad = bytearray(good)
-    for _ in range(data.draw(st.integers(1, 4))):
-        place = data.draw(st.integers(0, len(bad) - 1))
-        cut = data.draw(st.integers(0, 12))
-        bad[place : place + cut] = data.draw(st.binary(max_size=12))
-    path = recording.with_name("bad.mcap")
-    path.write_bytes(bytes(bad))
-    with suppress(FormatError):
-        read(path)
 
 
 def test_what_is_no_mcap_is_named(tmp_path: Path) -> None:

@@ -108,14 +108,6 @@ def test_ros_reads_every_message_by_the_definitions_in_the_file(recording: Path)
     assert decoded[3][1].startswith('{"time_us":')
 
 
-def test_a_message_is_in_the_file_as_soon_as_it_is_recorded(tmp_path: Path, session: Session) -> None:
-    with Recorder(tmp_path / "a.mcap", session) as recorder:
-        for number in range(3):
-            frame = SwitchFrame(now_us(), number)
-            recorder.frame(frame)
-            assert frames_of(recorder.path)[-1] == frame
-
-
 def test_the_file_is_ordered_by_log_time(tmp_path: Path, session: Session) -> None:
     start = now_us()
     with Recorder(tmp_path / "a.mcap", session) as recorder:

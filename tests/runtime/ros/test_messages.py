@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from thenar.runtime.published import LiveGrasp, Preshape
-from thenar.runtime.ros import state, trajectory
+from thenar.runtime.published import LiveGrasp
+from thenar.runtime.ros import state
 
 from .ros_types import STORE
 
@@ -40,16 +40,6 @@ def test_every_type_has_ross_name_and_fields(ros: ModuleType) -> None:
 def decoded(name: str, message: Any) -> Any:
     """Return what another decoder reads of a message, as it is sent: in plain CDR."""
     return STORE.deserialize_cdr(message.serialize(use_version_2=False), full(name))
-
-
-def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: ModuleType, preshape: Preshape) -> None:
-    read = decoded("trajectory_msgs/JointTrajectory", trajectory(ros.TYPES.__getitem__, preshape))
-    assert (read.header.stamp.sec, read.header.stamp.nanosec, read.header.frame_id) == (0, 0, "")
-    assert tuple(read.joint_names) == preshape.joint_names
-    (point,) = read.points
-    assert tuple(point.positions) == preshape.positions
-    assert (len(point.velocities), len(point.accelerations), len(point.effort)) == (0, 0, 0)
-    assert (point.time_from_start.sec, point.time_from_start.nanosec) == (1, 250_000_000)
 
 
 @pytest.mark.parametrize("segment_us", [None, 50_000])

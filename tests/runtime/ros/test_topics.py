@@ -26,15 +26,6 @@ from thenar.runtime.sinks import JointAngles, Sink, SinkError, open_sink
 MakeGrasp = Callable[..., LiveGrasp]
 Message = dict[str, Any]
 
-# Unicast on loopback alone: neither a network nor multicast is needed, and no other machine hears of it.
-LOOPBACK = """\
-<CycloneDDS><Domain>
-  <General><Interfaces><NetworkInterface name="lo"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
-  <Discovery>
-    <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>
-    <Peers><Peer address="localhost"/></Peers>
-  </Discovery>
-</Domain></CycloneDDS>"""
 DOMAIN = 77
 LISTENER = Path(__file__).with_name("ros_listener.py")
 names = count()
@@ -42,7 +33,8 @@ names = count()
 
 @pytest.fixture(autouse=True)
 def loopback(ros: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    # The other process keeps to loopback as well, by the same settings.
+    monkeypatch.setenv("CYCLONEDDS_URI", ros._LOOPBACK)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
 
 
@@ -295,8 +287,8 @@ def test_two_in_one_process_share_the_domain(sink: Sink, make_grasp: MakeGrasp, 
     assert (other.report().sent, sink.report().sent) == (1, 1)
 
 
-def test_settings_that_dds_cannot_use_are_told(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no_such_interface"'))
+def test_settings_that_dds_cannot_use_are_told(monkeypatch: pytest.MonkeyPatch, name: str, ros: ModuleType) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", ros._LOOPBACK.replace('address="127.0.0.1"', 'name="no_such_interface"'))
     monkeypatch.setenv("ROS_DOMAIN_ID", "78")
     with pytest.raises(SinkError, match=r"in domain 78.*CYCLONEDDS_URI"):
         open_sink(f"ros:{name}")

@@ -1,8 +1,5 @@
 """Harnesses of any small shape."""
 
-from collections.abc import Callable
-
-import pytest
 from hypothesis import strategies as st
 
 from thenar.drivers.i2c.chips import CHIPS
@@ -14,7 +11,7 @@ _PLACES = ((0, None), (1, None), (0, (0x70, 0)), (0, (0x70, 1)), (0, (0x71, 5)))
 
 
 @st.composite
-def _harnesses(draw: st.DrawFn, chips: int = 3, pins: int = 6) -> Harness:
+def harnesses(draw: st.DrawFn, chips: int = 3, pins: int = 6) -> Harness:
     """A sound harness of up to so many chips with up to so many switches each, and perhaps a board; s0, s1, ..."""
     buses: tuple[list[ChipWiring], list[ChipWiring]] = ([], [])
     switch = 0
@@ -45,25 +42,15 @@ def _harnesses(draw: st.DrawFn, chips: int = 3, pins: int = 6) -> Harness:
     )
 
 
-@pytest.fixture(scope="session")
-def harnesses() -> Callable[..., st.SearchStrategy[Harness]]:
-    return _harnesses
-
-
-@pytest.fixture(scope="session")
-def eight_chips() -> Callable[..., Harness]:
-    """Return a harness of MCP23017s with all usable pins wired, 14 switches each."""
-
-    def make(chips: int = 8, clock_hz: int = 400_000) -> Harness:
-        usable = [f"GP{port}{bit}" for port in "AB" for bit in range(7)]
-        wired = tuple(
-            ChipWiring(
-                kind="mcp23017",
-                address=0x20 + chip,
-                pins={pin: f"s{14 * chip + index}" for index, pin in enumerate(usable)},
-            )
-            for chip in range(chips)
+def eight_chips(chips: int = 8) -> Harness:
+    """Return a harness of MCP23017s at 400 kHz with all usable pins wired, 14 switches each."""
+    usable = [f"GP{port}{bit}" for port in "AB" for bit in range(7)]
+    wired = tuple(
+        ChipWiring(
+            kind="mcp23017",
+            address=0x20 + chip,
+            pins={pin: f"s{14 * chip + index}" for index, pin in enumerate(usable)},
         )
-        return Harness(name="full", buses=(BusWiring(device="/dev/i2c-1", clock_hz=clock_hz, chips=wired),))
-
-    return make
+        for chip in range(chips)
+    )
+    return Harness(name="full", buses=(BusWiring(device="/dev/i2c-1", clock_hz=400_000, chips=wired),))

@@ -83,12 +83,6 @@ def test_taxels_that_are_wired_to_nothing_are_named() -> None:
 # Times.
 
 
-def test_one_converter_alone_waits_for_each_conversion() -> None:
-    harness = glove(ads1115(0, "t0", "t1", "t2"))
-    time = scan_us(whole_scan(harness, ["t0>1", "t1>1", "t2>1"]), harness)
-    assert time.us == pytest.approx(3 * (START + WAIT + READ))
-
-
 def test_converters_and_expanders_are_read_one_after_the_other() -> None:
     harness = glove(
         *(ads1115(number, f"a{number}", f"b{number}") for number in range(4)),

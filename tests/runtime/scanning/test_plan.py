@@ -1,6 +1,6 @@
 """The scan map of a build and a harness, against brute force where there are few enough ways."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import permutations
 
 import pytest
@@ -12,11 +12,10 @@ from thenar.compiler.scan_file import scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness, MuxChannel
 from thenar.runtime.scanning.plan import plan_scan
-from thenar.runtime.scanning.scanmap import Port, ScanMap
+from thenar.runtime.scanning.scanmap import Port
 from thenar.runtime.scanning.timing import reading_of, scan_us
 
-Harnesses = Callable[..., st.SearchStrategy[Harness]]
-EightChips = Callable[..., Harness]
+from .conftest import eight_chips, harnesses
 
 
 def names_of(count: int) -> list[str]:
@@ -41,9 +40,7 @@ def mux_writes(ports: Sequence[Port], harness: Harness) -> int:
 
 @settings(deadline=None)
 @given(data=st.data())
-def test_every_kept_switch_is_read_once_with_the_fewest_writes_to_muxes(
-    harnesses: Harnesses, data: st.DataObject
-) -> None:
+def test_every_kept_switch_is_read_once_with_the_fewest_writes_to_muxes(data: st.DataObject) -> None:
     harness = data.draw(harnesses())
     kept = data.draw(st.lists(st.sampled_from(harness.switches), unique=True)) if harness.switches else []
     scan = plan_scan(kept, harness)
@@ -60,7 +57,7 @@ def test_every_kept_switch_is_read_once_with_the_fewest_writes_to_muxes(
     assert scanmap_from_bytes(scanmap_to_bytes(scan)) == scan
 
 
-def test_switches_that_are_wired_to_nothing_are_named(eight_chips: EightChips) -> None:
+def test_switches_that_are_wired_to_nothing_are_named() -> None:
     names = [*names_of(14), *(f"t{number}" for number in range(7))]
     with pytest.raises(
         HarnessError, match=r"'full' has no pin or column for t0, t1, t2, t3, t4 and 2 more, which the build"
@@ -68,12 +65,7 @@ def test_switches_that_are_wired_to_nothing_are_named(eight_chips: EightChips) -
         plan_scan(names, eight_chips(1))
 
 
-def test_a_build_without_switches_reads_nothing(eight_chips: EightChips) -> None:
-    scan: ScanMap = plan_scan([], eight_chips(1))
-    assert (scan.ports, scan.streams) == ((), ())
-
-
-def test_ports_behind_one_channel_and_one_mux_stay_together(eight_chips: EightChips) -> None:
+def test_ports_behind_one_channel_and_one_mux_stay_together() -> None:
     (bus,) = eight_chips(24).buses
     chips = tuple(
         replace(chip, address=0x20 + number % 8, mux=MuxChannel(address=0x70 + number // 16, channel=number // 8))

@@ -1,24 +1,20 @@
 """The fewest transactions, and of as few the shortest: against all sets of readings that there are."""
 
-from collections.abc import Callable
 from itertools import combinations
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.harness.checks import faults
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
-from thenar.runtime.scanning.ports import cover, ports_of
+from thenar.runtime.scanning.ports import ports_of
 from thenar.runtime.scanning.timing import port_us, reading_of
 
-Harnesses = Callable[..., st.SearchStrategy[Harness]]
-_KINDS = sorted(expanders())
+from .conftest import harnesses
 
 
 @given(data=st.data())
-def test_no_set_of_readings_is_smaller_or_as_small_and_shorter(harnesses: Harnesses, data: st.DataObject) -> None:
+def test_no_set_of_readings_is_smaller_or_as_small_and_shorter(data: st.DataObject) -> None:
     harness = data.draw(harnesses())
     assert not list(faults(harness))
     wanted = data.draw(st.sets(st.sampled_from(harness.switches))) if harness.switches else set()
@@ -51,36 +47,3 @@ def test_no_set_of_readings_is_smaller_or_as_small_and_shorter(harnesses: Harnes
         chip = harness.buses[port.bus].chips[port.chip]
         assert chip.numbered_pins[reading_of(port, harness).pins[bit]] == name
         assert port.closed_high == (chip.closed == "high")
-
-
-@pytest.mark.parametrize(
-    ("kind", "pins", "readings"),
-    [
-        ("mcp23017", [], []),
-        ("mcp23017", [0, 6], ["A"]),
-        ("mcp23017", [8], ["B"]),
-        ("mcp23017", [0, 8], ["AB"]),
-        ("pcf8575", [15], ["P"]),
-        ("tca6424a", [0, 8], ["01"]),
-        ("tca6424a", [8, 16], ["12"]),
-        ("tca6424a", [0, 16], ["012"]),
-    ],
-)
-def test_unwanted_ports_are_left_alone_at_no_extra_transaction(kind: str, pins: list[int], readings: list[str]) -> None:
-    chip = CHIPS[kind]
-    assert [reading.name for reading in cover(chip, pins)] == readings
-
-
-@pytest.mark.parametrize("kind", _KINDS)
-def test_every_input_of_every_kind_is_shown_by_a_reading(kind: str) -> None:
-    chip = CHIPS[kind]
-    for pin, name in enumerate(chip.pins):
-        if name not in chip.not_inputs:
-            assert len(cover(chip, [pin])) == 1
-
-
-def test_a_switch_that_nobody_asks_for_costs_nothing() -> None:
-    chip = ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "s0", "GPB0": "s1"})
-    harness = Harness(name="x", buses=(BusWiring(device="d", chips=(chip,)),))
-    assert [port.reading for port in ports_of(harness, {"s1": 0}, {})] == ["B"]
-    assert ports_of(harness, {}, {}) == ()

@@ -68,20 +68,6 @@ def read_all(reader: socket.socket) -> bytes:
         return file.read()
 
 
-def test_any_json_parser_reads_it(make_grasp: Callable[..., LiveGrasp], preshape: Preshape) -> None:
-    told = json.loads(encode(make_grasp(7), preshape, None))
-    assert told["number"] == 7
-    assert told["glove_age_us"] is None
-    assert told["lost"] == []
-    assert told["angles"] is None
-    assert told["preshape"] == {
-        "name": "cylindrical",
-        "joint_names": ["finger_1/prox_joint", "finger_1/med_joint"],
-        "positions": [0.0, 0.5],
-        "time_from_start_s": 1.25,
-    }
-
-
 def test_a_line_of_before_there_were_segments_is_read_as_one_without(make_grasp: Callable[..., LiveGrasp]) -> None:
     told = json.loads(encode(make_grasp(7), None, None))
     older = {name: value for name, value in told.items() if not name.startswith(("state", "segment"))}

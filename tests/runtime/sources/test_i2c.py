@@ -1,11 +1,10 @@
 """What a device makes of the answers of its ports; that the ports are read is shown on real device nodes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from thenar.runtime import Build
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness
 from thenar.runtime.scanning.ports import whole_scan
@@ -13,7 +12,6 @@ from thenar.runtime.sources import i2c as module
 from thenar.runtime.sources.base import slowest_us, sources_of
 from thenar.runtime.sources.i2c import I2cDevice
 
-MakeBuild = Callable[..., Build]
 NAMES = tuple(f"s{number}" for number in range(6))
 HIGH = 0xFF
 

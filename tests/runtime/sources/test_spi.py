@@ -54,16 +54,6 @@ def test_levels_are_closed_above_their_codes_and_the_codes_go_along(answers: lis
     assert device.fault_message() == ""
 
 
-def test_a_converter_is_read_at_its_rate(answers: list[list[int | None]], monkeypatch: pytest.MonkeyPatch) -> None:
-    device, clock_s = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES)), [1.0]
-    monkeypatch.setattr("time.monotonic", lambda: clock_s[0])
-    answers += [[41, 100]] * 2
-    read = []
-    for clock_s[0] in (1.0, 1.001, 1.004, 1.0051, 1.006):
-        read.append(device.read(0.0) is not None)
-    assert read == [True, False, False, True, False]
-
-
 def test_where_no_converter_answers_levels_are_lost_and_it_says_so(answers: list[list[int | None]]) -> None:
     device = SpiConverter(HARNESS, 1, whole_scan(HARNESS, NAMES))
     answers.append([None, None])
