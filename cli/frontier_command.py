@@ -195,9 +195,9 @@ def print_frontier(frontier: "Frontier") -> None:
             *(f"{point.flash:,}", f"{point.ram:,}"),
             style="bold" if point.number == frontier.picked else "",
         )
-    console, folds = out(), words.folds_of(frontier)
+    console, folds, luck = out(), words.folds_of(frontier), words.luck_of(frontier)
     console.print(grid)
-    console.print(Text(f"{folds}. Accuracy in % with 95 % intervals. {words.LUCK} Flash, RAM: bytes.", "dim"))
+    console.print(Text(f"{folds}. Accuracy in % with 95 % intervals. {luck} Flash, RAM: bytes.", "dim"))
     for missing in frontier.skipped:
         console.print(Text(missing, "yellow"))
     console.print()

@@ -9,8 +9,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Recognised
-from thenar.runtime.model.tables import ScoreTables, winners
+from thenar.runtime.manifest import Of, Recognised
+from thenar.runtime.model.quantise import quantise
+from thenar.runtime.model.tables import ScoreTables
 from thenar.runtime.recipe import Recipe
 
 from .evaluation.folds import EvaluationError, Fold, leave_one_out
@@ -38,12 +39,13 @@ def related_joints(tables: ScoreTables, learnt: Samples) -> tuple[int, ...]:
 
 
 def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRIES) -> list[Hits]:
-    """Return the effect of each try on each person in `samples`, with all inputs, whom the recogniser has not seen.
+    """Return the effect of each try on each person in `samples`, with all inputs, whom the recogniser has not seen, by
+    integer tables.
 
     A person's first trials of each type adapt; those that no try needs are tested. A person without such is left out.
     """
     read = recogniser.read(samples).without_none()
-    tables = collapse(recogniser.model, read.n_switches)
+    tables, recipe = collapse(recogniser.model, read.n_switches), recogniser.recipe
     related = related_joints(tables, recogniser.read(recogniser.samples))
     most, found = max(own for own, _ in tries), []
     for person in np.setdiff1d(read.subjects, recogniser.samples.subjects):
@@ -54,11 +56,12 @@ def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRI
             place[truth == label] = np.arange(np.count_nonzero(truth == label))
         tested, correct = place >= most, []
         for own, strength in tries if tested.any() else ():
-            some, adapted = rows.rows((place < own)[trial]) if own else None, tables
-            if some is not None:
-                columns = some.switches, some.codes, some.labels, some.trials
-                adapted = Adaptation(tables, *columns, strength, related).adapted
-            predicted = winners(adapted.scores(rows.switches, rows.codes))
+            integers = recogniser.integers
+            if own:
+                some = rows.rows((place < own)[trial])
+                adaptation = Adaptation(tables, some.switches, some.codes, some.labels, some.trials, strength, related)
+                integers = quantise(adaptation.adapted, some.switches, some.codes, recipe.width, recipe.table_bits)
+            predicted = integers.scores(rows.switches, rows.codes).argmax(axis=1)
             hits = decided(predicted[np.newaxis], trial)[0] == truth
             correct.append(int(np.count_nonzero(hits & tested)))
         found += [(tuple(correct), int(np.count_nonzero(tested)))] if correct else []
@@ -71,18 +74,23 @@ def chosen_strength(hits: Sequence[Hits], folds: int, seed: int) -> tuple[float,
     """
     if len(hits) < _LEAST_PEOPLE:
         return STRENGTH, []
-    rate = rate_after_adaptation(hits)
+    rate = after_adaptation(hits)
     low, high = round(rate.low, 6), round(rate.high, 6)
     recognised = Recognised("nested", folds, seed, rate.correct[0], rate.total, rate.of, rate.unit, low, high)
     return STRENGTHS[_best(hits)], [recognised]
 
 
-def rate_after_adaptation(hits: Sequence[Hits]) -> Rate:
+def after_adaptation(hits: Sequence[Hits]) -> Rate:
     """Return the accuracy of people, from the effects of all STRENGTHS: of each with the one that suits the others."""
+    return of_people(hits, _chosen_by_others(hits), "new subject after adaptation")
+
+
+def of_people(hits: Sequence[Hits], numbers: Sequence[int], of: Of) -> Rate:
+    """Return the accuracy of people, each with the try of this number."""
     totals = [total for _, total in hits]
-    correct = [own[best] for best, (own, _) in zip(_chosen_by_others(hits), hits, strict=True)]
+    correct = [own[number] for number, (own, _) in zip(numbers, hits, strict=True)]
     right, total, (low, high) = sum(correct), sum(totals), clustered(correct, totals, "trials")
-    return Rate("new subject after adaptation", "trials", (right,), total, len(hits), right / total, low, high)
+    return Rate(of, "trials", (right,), total, len(hits), right / total, low, high)
 
 
 def _chosen_by_others(hits: Sequence[Hits]) -> list[int]:

@@ -139,11 +139,14 @@ class Layout:
 
     @property
     def means(self) -> Rows:
-        """Rows (1 + K,): the binary logarithm of a step, and what each input adds in steps if it is missing."""
+        """For each input a shift, and what it adds to an open switch, or to code 0, if it is missing, (s + j, 1 + K).
+
+        Raises FirmwareError if bytes do not hold it, as in a build of an earlier version.
+        """
         missing, shifts = self.tables.missing, self.tables.missing_shifts[:, np.newaxis]
         means = missing >> shifts
         if (means << shifts != missing).any():
-            raise FirmwareError("the means of missing inputs are finer than bytes: round them by quantise.in_bytes")
+            raise FirmwareError("what missing inputs add is finer than firmware stores: compile the build again")
         return np.hstack([shifts, means])
 
     @property

@@ -128,11 +128,11 @@ def _effort(design: Design) -> tuple[float, ...]:
 def points_of(
     designs: Sequence[Design],
     luck: Mapping[TrialAccuracy, float],
-    adapted: Mapping[Recipe, Rate | None],
+    adapted: Mapping[Recipe, tuple[Rate, Rate]],
     survey: Survey,
 ) -> tuple[FrontierPoint, ...]:
     """Return the points on a front, numbered from the fastest frame on; `luck` is subtracted from each rate, `adapted`
-    has those after adaptation.
+    has those before and after adaptation.
     """
     fronts = dict(zip(("frame", "switches"), best_designs(designs), strict=True))
     best = [design for design in designs if any(design in some for some in fronts.values())]

@@ -99,7 +99,8 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     luck        the optimism of picking the best of all that was tried (`evaluation.rates.Draws`)
     frames      the rate of single frames, uncorrected (None: a trial has one frame)
     other_rate  the other of the two, uncorrected (None: only one subject)
-    adapted     the rate of new subjects after a frontier's `own` trials a type, uncorrected (None: not asked for)
+    adapted     the rates of new subjects before and after a frontier's `own` trials a type, on their further trials,
+                uncorrected (None: not asked for)
     scan        reading the switches; transfer: the joints
     frame       max(scan, transfer) + classify: the two use separate lines
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
@@ -123,7 +124,7 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     chips: Count
     fronts: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
-    adapted: Rate | None = None
+    adapted: tuple[Rate, Rate] | None = None
 
     @property
     def by_sensors(self) -> bool:
@@ -272,7 +273,8 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
         yield "does not number its points 1, 2, 3 and so on"
     if frontier.picked is not None and not 1 <= frontier.picked <= len(frontier.points):
         yield f"picked point {frontier.picked}, which it does not have"
-    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.other_rate, point.adapted)]
+    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.other_rate)]
+    rates += [rate for point in frontier.points for rate in point.adapted or ()]
     rates += [each.rate for each in frontier.tried] + [mark.rate for mark in frontier.marks]
     if not all(rate is None or 0 <= rate.low <= rate.mean <= rate.high <= 1 for rate in rates):
         yield "has a rate that is no share"

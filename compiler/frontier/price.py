@@ -302,7 +302,7 @@ class PricedTables(Struct, frozen=True):
         return max(scan_us, joints_us) + self.classified.us
 
 
-@stored(7)
+@stored(8)
 def price(
     samples: Samples,
     names: tuple[str, ...],
@@ -315,7 +315,7 @@ def price(
 ) -> tuple[PricedTables, ...]:
     """Train on some rows, on the selected inputs, whose elements have these names; price the tables.
 
-    lost  fit the substitutes for lost inputs, which is needed if exact flash sizes matter
+    lost  fit the substitutes for lost inputs, which firmware stores
     """
     scans = equipment.scans(names)
     return tuple(
@@ -335,8 +335,7 @@ def tables_of(
 ) -> Iterator[tuple[Recipe, IntegerTables]]:
     """Yield the tables of each recipe, which differ in rounds and shape, from one training on some rows.
 
-    lost  fit the substitutes for lost inputs, as in a build: the flash size depends on them, while scores of whole
-          frames do not. Otherwise they are mean rows
+    lost  fit the substitutes for lost inputs, as in a build, for firmware. Otherwise they are mean rows
     """
     rounds = [one.rounds or 1 for one in recipes]
     made = Recogniser.stages(samples, recipes[0], rows, selection, training, rounds)
@@ -345,7 +344,7 @@ def tables_of(
         yield recipe, shaped.tables if lost else shaped.integers
 
 
-@stored(3)
+@stored(4)
 def count_steps(content: bytes, model: ClassifyModel) -> float:
     """Compile the classifier of tables and run it; return the cycles of the slowest of the frames that should take
     longest and of extreme ones. Raises FirmwareError.

@@ -25,8 +25,8 @@ from ..recogniser import Recogniser, predicted_classes
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples, decided
 from ..trainers.base import Training
-from ..wearer import STRENGTHS
-from ..wearer_study import Hits, hits_of, rate_after_adaptation
+from ..wearer import STRENGTH, STRENGTHS
+from ..wearer_study import Hits, Try, after_adaptation, hits_of, of_people
 from .cache import Cache, stored
 from .points import By, PointTime
 from .price import Equipment, PricedTables, count_steps, price, time_here
@@ -266,18 +266,20 @@ class Survey:
         }
         return self._ask(fit_stages, calls)
 
-    def adapted(self, recipes: Iterable[Recipe], own: int) -> dict[Recipe, Rate | None]:
-        """Return the accuracy of the subjects left out after `own` trials a type of theirs, for recipes with their
-        rounds; None if nobody has more trials.
+    def adapted(self, recipes: Iterable[Recipe], own: int) -> dict[Recipe, tuple[Rate, Rate]]:
+        """Return the accuracy of the subjects left out before and after `own` trials a type of theirs, for tabled
+        recipes. One of the subjects has more trials of a type.
         """
+        # Without own trials no strength counts.
+        tries = (0, STRENGTH), *((own, strength) for strength in STRENGTHS)
         calls = {
             (recipe, fold): (
                 self.samples,
                 fold,
                 self.selection(recipe, fold),
                 self.training(recipe, fold),
-                recipe.rounds or 1,
-                own,
+                recipe,
+                tries,
             )
             for recipe in recipes
             for fold in self.cuts.subjects
@@ -285,7 +287,13 @@ class Survey:
         people: dict[Recipe, list[Hits]] = {}
         for (recipe, _), hits in self._ask(adapt_to_left_out, calls).items():
             people.setdefault(recipe, []).extend(hits)
-        return {recipe: rate_after_adaptation(hits) if hits else None for recipe, hits in people.items()}
+        return {
+            recipe: (
+                of_people(hits, [0] * len(hits), "new subject"),
+                after_adaptation([(correct[1:], total) for correct, total in hits]),
+            )
+            for recipe, hits in people.items()
+        }
 
     def prices(
         self, tables: Mapping[Recipe, tuple[Recipe, ...]], rows: Rows, *, lost: bool = False
@@ -384,13 +392,11 @@ def fit_stages(
 
 @stored(1)
 def adapt_to_left_out(
-    samples: Samples, fold: Fold, selection: InputSelection, training: Training, rounds: int, own: int
+    samples: Samples, fold: Fold, selection: InputSelection, training: Training, recipe: Recipe, tries: tuple[Try, ...]
 ) -> list[Hits]:
-    """Train on a fold's training rows, and adapt to each subject of its test rows by `own` trials a type with every
-    strength; see `hits_of`.
-    """
-    (recogniser,) = Recogniser.stages(samples, Recipe(), fold.train, selection, training, (rounds,))
-    return hits_of(recogniser, samples.rows(fold.test), [(own, strength) for strength in STRENGTHS])
+    """Train a tabled recipe on a fold's training rows, and adapt to each subject of its test rows; see `hits_of`."""
+    (recogniser,) = Recogniser.stages(samples, recipe, fold.train, selection, training, (recipe.rounds or 1,))
+    return hits_of(recogniser, samples.rows(fold.test), tries)
 
 
 def _packed(predictions: Rows, test: Samples) -> tuple[bytes, bytes]:

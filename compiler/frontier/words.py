@@ -138,11 +138,18 @@ LUCK = (
 def folds_of(frontier: Frontier) -> str:
     """Return the protocol of the rates by which points are chosen: "new subject: each of 3 subjects left out"."""
     if frontier.by == "new subject":
-        folds = f"New subject, trials: the {counted(frontier.subjects, 'subject')} left out in turn"
-    else:
-        repeats = counted(frontier.repeats, "repeat")
-        folds = f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
-    return f"{folds}; own trials adapt a new subject's model, the others are tested" if frontier.own else folds
+        return f"New subject, trials: the {counted(frontier.subjects, 'subject')} left out in turn"
+    repeats = counted(frontier.repeats, "repeat")
+    return f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
+
+
+def luck_of(frontier: Frontier) -> str:
+    """Return sentences on which rates are corrected for luck, and which trials adapt."""
+    adapting = (
+        f" The first {counted(frontier.own, 'trial')} of each type of a new subject adapt the model; its further ones "
+        "are tested before and after that, uncorrected."
+    )
+    return LUCK + (adapting if frontier.own else "")
 
 
 def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | None]]:
@@ -155,7 +162,8 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | N
     if frontier.other is not None:
         found[frontier.other] = lambda point: point.other_rate
     if frontier.own:
-        found[f"after {counted(frontier.own, 'own trial')} a type"] = lambda point: point.adapted
+        found["before own trials"] = lambda point: point.adapted and point.adapted[0]
+        found[f"after {frontier.own} a type"] = lambda point: point.adapted and point.adapted[1]
     return found
 
 
@@ -174,7 +182,7 @@ def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of names, and a line for each point.
 
     The columns of trainer and settings are only there if a point's are not the defaults. Rates are in 0..1, times in
-    microseconds; `frames`, `other_rate` and `adapted` may be empty. `fronts`, `switches` and `settings` are lists in a
+    microseconds; all rates but `rate` may be empty. `fronts`, `switches` and `settings` are lists in a
     cell, separated by semicolons; names with a semicolon or a quote are quoted as in CSV.
     """
     file = io.StringIO(newline="")
@@ -193,8 +201,9 @@ def _cells(point: FrontierPoint) -> dict[str, object]:
     row: dict[str, object] = {"number": point.number, "fronts": _list(point.fronts), "n_switches": len(point.switches)}
     row |= {"inputs": setting.inputs, "method": placement.method, "parameter": placement.parameter}
     row |= {"rounds": setting.rounds, "width": setting.width, "wiring": setting.wiring, "clock_hz": setting.clock_hz}
-    kinds = ("rate", point.rate), ("frames", point.frames), ("other_rate", point.other_rate), ("adapted", point.adapted)
-    for name, rate in kinds:
+    before, after = point.adapted or (None, None)
+    kinds = {"rate": point.rate, "frames": point.frames, "other_rate": point.other_rate, "own_before": before}
+    for name, rate in (kinds | {"own_after": after}).items():
         numbers = ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
         row |= zip((f"{name}_of", name, f"{name}_low", f"{name}_high"), numbers, strict=True)
         if name == "rate":

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from ..evaluation.rates import interval
 from ..frontier.points import Frontier
 from ..frontier.words import (
-    LUCK,
     counted_of,
     elements_of,
     folds_of,
+    luck_of,
     of_time,
     rates_of,
     summary,
@@ -72,7 +72,7 @@ def notes(frontier: Frontier, built: int | None) -> Iterator[str]:
         f"{counted(frontier.trials, 'trial')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
         f"{taxels}{counted(frontier.n_joints, 'joint')}; times on {frontier.machine}. "
-        f"{folds_of(frontier)}, placement inside the fold, with 95{NBSP}% intervals. {LUCK}"
+        f"{folds_of(frontier)}, placement inside the fold, with 95{NBSP}% intervals. {luck_of(frontier)}"
     )
     if frontier.wanted and frontier.picked is not None:
         yield f"Point {frontier.picked} was picked for {frontier.wanted}."

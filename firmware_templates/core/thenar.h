@@ -113,7 +113,7 @@ typedef struct {
     const thenar_grid *grids;
     const uint16_t *thresholds;
     const int8_t *means;            /* [switches + joints][1 + classes]: a shift, and what a missing input adds to open,
-                                       or to code 0, before that */
+                                       or to code 0, shifted right by it */
     const char *names;              /* each with its end */
     const thenar_rejection *rejection;
 } thenar_model;

@@ -201,7 +201,7 @@ class IntegerTables(Additive):
 
     @property
     def missing_shifts(self) -> Steps:
-        """The binary logarithms of the finest steps in which bytes hold each row of `missing`, rounded, (s + j,)."""
+        """How many bits each row of `missing` has to be shifted right to fit signed bytes, (s + j,)."""
         most = np.abs(self.missing).max(axis=1).tolist()
         return np.array([max(0, number.bit_length() - 7) for number in most], np.int64)
 

@@ -189,13 +189,18 @@ def test_points_after_own_trials_are_those_that_evaluate_finds(tmp_path: Path) -
     assert found.points
     for point in found.points:
         options = picked(tmp_path / "out" / "frontier.json", point.number, grasp_set).options
-        row = study_wearers(grasp_set, changed(Recipe(), options), (2,), 1).rows[0]
+        rows = study_wearers(grasp_set, changed(Recipe(), options), (0, 2), 1).rows
         assert point.adapted is not None
         # All of the three have as many trials.
-        assert point.adapted.mean == pytest.approx(fmean(row.people))
-        assert (point.adapted.over, point.adapted.total) == (3, 96 - 3 * 4 * 2)
-    for wrong in ({"grasp_set": make_set()}, {"own": 8}):
-        with pytest.raises(FrontierError, match=r"record two or more subjects|nobody has more than 8 trials of a type"):
+        for rate, found in zip(point.adapted, rows, strict=True):
+            assert rate.mean == pytest.approx(fmean(found.people))
+            assert (rate.over, rate.total) == (3, 96 - 3 * 4 * 2)
+    refusals: dict[str, dict[str, object]] = {
+        "record two or more subjects": {"grasp_set": make_set()},
+        "nobody has more than 8 trials of a type": {"own": 8},
+    }
+    for reason, wrong in refusals.items():
+        with pytest.raises(FrontierError, match=reason):
             found_of(request | wrong | {"output": tmp_path / "refused"})
     assert not (tmp_path / "refused").exists()
 
