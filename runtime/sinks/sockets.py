@@ -9,6 +9,7 @@ Places are limited. A reader that takes nothing for five seconds is dropped.
 
 import errno
 import ipaddress
+import os
 import re
 import socket
 from contextlib import suppress
@@ -158,17 +159,11 @@ def listen(place: str, where: str, example: str) -> socket.socket:
 
 
 def _listener(family: socket.AddressFamily, address: tuple[str, int], where: str) -> socket.socket:
-    listener = socket.socket(family, socket.SOCK_STREAM)
     try:
-        # Without it the port stays taken for a minute after its last reader.
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-        listener.listen(_BACKLOG)
+        return socket.create_server(address, family=family, backlog=_BACKLOG, dualstack_ipv6=family == socket.AF_INET6)
     except OSError as reason:
-        listener.close()
         hint = ": another process serves that port; use another" if reason.errno == errno.EADDRINUSE else ""
-        raise SinkError(f"{where} cannot be opened: {reason.strerror}{hint}") from None
-    return listener
+        raise SinkError(f"{where} cannot be opened: {os.strerror(reason.errno or 0)}{hint}") from None
 
 
 def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily, tuple[str, int]]:
