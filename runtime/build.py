@@ -43,21 +43,11 @@ class Build:
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
     order of `manifest.joints`. Of equal scores the first grasp type wins. `scorer` is shared by all users of the
-    scores. `none` is the class of frames in which nothing is held, None if no training row showed that; then `rejector`
-    decides which frames are refused, None if none is, and `none_leads` holds the leads of none for a frame that is not
-    refused and for one that is.
+    scores, and may refuse frames. `none` is the class of frames in which nothing is held, None if no training row
+    showed that.
     """
 
-    __slots__ = (
-        "classes",
-        "grasps",
-        "manifest",
-        "none",
-        "none_leads",
-        "rejector",
-        "scorer",
-        "tables",
-    )
+    __slots__ = ("classes", "grasps", "manifest", "none", "scorer", "tables")
 
     def __init__(self, manifest: Manifest, tables: IntegerTables) -> None:
         """Combine the parts of a build. Raises BuildError if they describe different builds."""
@@ -72,7 +62,6 @@ class Build:
         self.tables = tables
         self.grasps, self.classes = manifest.grasps, manifest.classes
         self.scorer = Scorer(tables, manifest.rejection)
-        self.rejector, self.none_leads = self.scorer.rejector, self.scorer.none_leads
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
 
     @classmethod

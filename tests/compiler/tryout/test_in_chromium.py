@@ -123,7 +123,7 @@ def test_all_rows_have_pythons_scores_and_answers(trier: Trier, tmp_path: Path, 
 def test_the_page_predicts_none_as_python_does(trier: Trier, with_none_too: GraspSet, tmp_path: Path) -> None:
     for name, grasp_set in (("class", with_none_too), ("refusing", make_set())):
         build = compiled(grasp_set, tmp_path / name, rounds=8)
-        assert (build.rejector is None) == (name == "class")
+        assert (build.scorer.rejector is None) == (name == "class")
         trier.open_file(tmp_path / name / "report.html", "#try")
         warned = trier.script("return document.getElementById('empty-hand')?.checkVisibility() ?? false")
         assert warned == (name == "refusing")
