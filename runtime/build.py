@@ -92,8 +92,8 @@ class Build:
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
-        closed, values = self.scorer.frame(bits, codes)
-        scores, _ = self.scorer.with_none(self.scorer.state_scores(closed, 0, values), closed, 0, values, 0)
+        state = self.scorer.state(bits, codes)
+        scores, _ = self.scorer.with_none(self.scorer.state_scores(*state), *state)
         return self.classes[scores.index(max(scores))]
 
     def recognise(
@@ -121,14 +121,12 @@ class Build:
         FrameError
             If the frame does not fit the build.
         """
-        closed, values = self.scorer.frame(bits, codes)
-        lost, absent = self.scorer.losses(lost_switches, lost_joints)
-        state = closed, lost, values, absent
+        state = self.scorer.state(bits, codes, lost_switches, lost_joints)
         biased_scores, _ = self.scorer.with_none(self.scorer.state_scores(*state), *state)
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
         probability = softmax(biased_scores, self.tables.scale)[winner]
-        return Recognition(self.classes[winner], probability, best - second, bool(lost or absent))
+        return Recognition(self.classes[winner], probability, best - second, bool(state[1] or state[3]))
 
 
 def load_manifest(folder: "Path") -> Manifest:

@@ -121,7 +121,7 @@ class FirmwareTrial:
         """Return the scores with the `_lost` inputs missing."""
         frames = zip(self._frames.bits, self._frames.codes, self._lost, strict=True)
         switches = self._build.tables.n_switches
-        without = self._build.scorer.biased_scores_without
+        without = self._build.scorer.biased_scores
         biased_scores = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
         return np.array(biased_scores) - LANE_OFFSET
 

@@ -81,7 +81,7 @@ def differing(build: Build, frames: list[list[list[int]]], answers: list[dict[st
     for number, ((bits, codes, lost, lost_joints), told) in enumerate(zip(frames, answers, strict=True)):
         flags = [np.array(each, bool) for each in (bits, lost, lost_joints)]
         said = build.recognise(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
-        lanes = build.scorer.biased_scores_without(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
+        lanes = build.scorer.biased_scores(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
         scores = [lane - 32768 for lane in lanes]
         whole = (said.grasp, said.margin, said.degraded) == (told["grasp"], told["margin"], told["degraded"])
         probable = abs(said.probability - told["probabilities"][told["number"]]) < 1e-12
