@@ -146,8 +146,9 @@ def listen(place: str, where: str, example: str, *, public: bool = True) -> sock
     Raises SinkError if it cannot be opened.
     """
     family, address = resolve(place, where, example, public=public)
+    dual = family == socket.AF_INET6 and socket.has_dualstack_ipv6()
     try:
-        return socket.create_server(address, family=family, backlog=_BACKLOG, dualstack_ipv6=family == socket.AF_INET6)
+        return socket.create_server(address, family=family, backlog=_BACKLOG, dualstack_ipv6=dual)
     except OSError as reason:
         hint = ": another process serves that port; use another" if reason.errno == errno.EADDRINUSE else ""
         raise SinkError(f"{where} cannot be opened: {os.strerror(reason.errno or 0)}{hint}") from None
