@@ -43,21 +43,11 @@ class Build:
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
     order of `manifest.joints`. Of equal scores the first grasp type wins. `scorer` is shared by all users of the
-    scores. `none` is the class of frames in which nothing is held, None if no training row showed that; then `rejector`
-    decides which frames are refused, None if none is, and `none_leads` holds the leads of none for a frame that is not
-    refused and for one that is.
+    scores, and may refuse frames. `none` is the class of frames in which nothing is held, None if no training row
+    showed that.
     """
 
-    __slots__ = (
-        "classes",
-        "grasps",
-        "manifest",
-        "none",
-        "none_leads",
-        "rejector",
-        "scorer",
-        "tables",
-    )
+    __slots__ = ("classes", "grasps", "manifest", "none", "scorer", "tables")
 
     def __init__(self, manifest: Manifest, tables: IntegerTables) -> None:
         """Combine the parts of a build. Raises BuildError if they describe different builds."""
@@ -72,7 +62,6 @@ class Build:
         self.tables = tables
         self.grasps, self.classes = manifest.grasps, manifest.classes
         self.scorer = Scorer(tables, manifest.rejection)
-        self.rejector, self.none_leads = self.scorer.rejector, self.scorer.none_leads
         self.none = len(self.grasps) - 1 if self.grasps[-1] == NONE else None
 
     @classmethod
@@ -103,8 +92,8 @@ class Build:
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame, "none" if nothing is held. Raises FrameError."""
-        closed, values = self.scorer.frame(bits, codes)
-        scores, _ = self.scorer.with_none(self.scorer.state_scores(closed, 0, values), closed, 0, values, 0)
+        state = self.scorer.state(bits, codes)
+        scores, _ = self.scorer.with_none(self.scorer.state_scores(*state), *state)
         return self.classes[scores.index(max(scores))]
 
     def recognise(
@@ -132,14 +121,12 @@ class Build:
         FrameError
             If the frame does not fit the build.
         """
-        closed, values = self.scorer.frame(bits, codes)
-        lost, absent = self.scorer.losses(lost_switches, lost_joints)
-        state = closed, lost, values, absent
+        state = self.scorer.state(bits, codes, lost_switches, lost_joints)
         biased_scores, _ = self.scorer.with_none(self.scorer.state_scores(*state), *state)
         second, best = sorted(biased_scores)[-2:]
         winner = biased_scores.index(best)
         probability = softmax(biased_scores, self.tables.scale)[winner]
-        return Recognition(self.classes[winner], probability, best - second, bool(lost or absent))
+        return Recognition(self.classes[winner], probability, best - second, bool(state[1] or state[3]))
 
 
 def load_manifest(folder: "Path") -> Manifest:

@@ -4,16 +4,14 @@ A calibration gives the codes of two readings. A straight line runs between them
 codes gets the even one. The codes of the two points are rounded once, to 2^-24 of a code.
 """
 
-from math import isfinite
-
 from msgspec import Struct
 
 from thenar.drivers.calibration import SensorCalibration
 from thenar.drivers.errors import SettingError
 
 from .manifest import Calibration
+from .model.terms.base import HIGHEST_CODE
 
-HIGHEST_CODE = 65535
 # Readings are integers from -65535 to 65535; readings beyond count as the nearest.
 FARTHEST = 65535
 # Fraction bits of a point's code, and the most integer bits: so all fits into 64 bits.
@@ -56,9 +54,7 @@ def code_point(coded: Calibration, value: float) -> int:
         code = coded.code_a + (value - coded.value_a) / step
     except ZeroDivisionError:
         raise SettingError(f"the two points of {coded.name!r} in the build make no line: compile it again") from None
-    if not isfinite(code):
-        raise SettingError(f"the calibration of {coded.name!r} is not a number: calibrate the glove again")
-    if abs(code) >= 1 << _WHOLE:
+    if not abs(code) < 1 << _WHOLE:
         raise SettingError(
             f"the calibration of {coded.name!r} has {value:g} {coded.unit} at one of its points, which is far beyond "
             f"the {HIGHEST_CODE + 1} codes of the build: calibrate the glove again"

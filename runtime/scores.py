@@ -90,27 +90,34 @@ class Scorer:
         """The same for the mean rows."""
         return _sums(self.switch_means)
 
-    def biased_scores(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
-        """Return the scores of one frame, each 2^15 too high: K integers. Raises FrameError."""
-        closed, values = self.frame(bits, codes)
-        return self.state_scores(closed, 0, values)
-
-    def biased_scores_without(
-        self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
+    def biased_scores(
+        self,
+        bits: ArrayLike,
+        codes: ArrayLike,
+        lost_switches: ArrayLike | None = None,
+        lost_joints: ArrayLike | None = None,
     ) -> tuple[int, ...]:
-        """Return `biased_scores`, with the mean row for every switch and joint that the masks mark as lost."""
-        closed, values = self.frame(bits, codes)
-        lost, absent = self.losses(lost_switches, lost_joints)
-        return self.state_scores(closed, lost, values, absent)
+        """Return the scores of one frame, each 2^15 too high: K integers. The arguments and errors are `state`'s."""
+        return self.state_scores(*self.state(bits, codes, lost_switches, lost_joints))
 
-    def frame(self, bits: ArrayLike, codes: ArrayLike) -> tuple[Mask, list[int]]:
-        """Return the closed switches and the codes of one frame. Raises FrameError."""
-        return _mask(bits, len(self.switch_rows), "switches"), self._codes(codes)
+    def state(
+        self,
+        bits: ArrayLike,
+        codes: ArrayLike,
+        lost_switches: ArrayLike | None = None,
+        lost_joints: ArrayLike | None = None,
+    ) -> tuple[Mask, Mask, list[int], Mask]:
+        """Return the closed and the lost switches, the codes and the lost joints of one frame; None: nothing is lost.
 
-    def losses(self, lost_switches: ArrayLike | None, lost_joints: ArrayLike | None) -> tuple[Mask, Mask]:
-        """Return the lost switches and joints of one frame; None: none is. Raises FrameError."""
-        switches = 0 if lost_switches is None else _mask(lost_switches, len(self.switch_rows), "lost switches")
-        return switches, 0 if lost_joints is None else _mask(lost_joints, len(self.thresholds), "lost joints")
+        Raises FrameError.
+        """
+        switches, joints = len(self.switch_rows), len(self.thresholds)
+        return (
+            _mask(bits, switches, "switches"),
+            0 if lost_switches is None else _mask(lost_switches, switches, "lost switches"),
+            self._codes(codes),
+            0 if lost_joints is None else _mask(lost_joints, joints, "lost joints"),
+        )
 
     def joint_sum(self, codes: Sequence[int], lost: Mask = 0) -> int:
         """Return the sum of the contributions of all joints' codes, with the mean for lost ones."""
@@ -131,8 +138,8 @@ class Scorer:
     def state_scores(
         self, closed: Mask, lost: Mask, codes: Sequence[int] | None, lost_joints: Mask = 0
     ) -> tuple[int, ...]:
-        """Return `biased_scores_without` of a state: of masks of switches and joints, and of all codes, None if all are
-        lost. Bits of `closed` that are lost are ignored. Raises FrameError.
+        """Return `biased_scores` of a state, with mean rows for what is lost; codes are None if all joints are. Bits of
+        `closed` that are lost are ignored. Raises FrameError.
         """
         if (closed | lost) >> len(self.switch_rows):
             raise FrameError(f"a switch beyond the {len(self.switch_rows)} of the build is closed or lost")

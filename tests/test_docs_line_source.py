@@ -8,7 +8,7 @@ from thenar.drivers.lines import LONGEST, ColumnHeader, LineCounts, Row, parsed
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.sinks.base import SINKS
 from thenar.runtime.sources.base import SOURCES
-from thenar.runtime.sources.rows import _TAXEL_STEPS, JOINT_CODES, RowCounts, RowKind
+from thenar.runtime.sources.rows import _TAXEL_STEPS, JOINT_CODES, RowCounts, RowKind, kind_of
 
 PAGE = (Path(__file__).parents[1] / "docs" / "how-to" / "own-board.md").read_text(encoding="utf-8")
 
@@ -37,7 +37,7 @@ def test_every_count_and_every_way_is_there() -> None:
     assert named == counts | {"rows a second"}
     ports = [port.strip("` ") for cell in cells("`port`") for port in cell.split(", ")]
     kinds = [kind for kind in SOURCES.values() if isinstance(kind, RowKind)]
-    assert {kind.name for kind in kinds if any(kind.takes(port) for port in ports)} == {kind.name for kind in kinds}
+    assert {kind_of(port) for port in ports} == {kind.name for kind in kinds}
     assert "lsl" in SINKS
 
 

@@ -145,7 +145,7 @@ def verify(
     worst = worst_case(model, build.tables, comparison, build.grasps, names)
     grasps, empty = np.array(build.grasps), grasp_set.is_none
     predicted = predicted_classes(build.tables, build.manifest.rejection, bits, codes)
-    number = build.none if build.rejector is None else len(grasps)
+    number = build.none if build.scorer.rejector is None else len(grasps)
     nothing_held = None
     if number is not None:
         detected = predicted == number

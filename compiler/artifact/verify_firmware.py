@@ -121,7 +121,7 @@ class FirmwareTrial:
         """Return the scores with the `_lost` inputs missing."""
         frames = zip(self._frames.bits, self._frames.codes, self._lost, strict=True)
         switches = self._build.tables.n_switches
-        without = self._build.scorer.biased_scores_without
+        without = self._build.scorer.biased_scores
         biased_scores = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
         return np.array(biased_scores) - LANE_OFFSET
 
@@ -156,7 +156,7 @@ class FirmwareTrial:
 
     def _classes(self, scores: NDArray[np.int64], *, missing: bool) -> NDArray[np.intp]:
         """Return the class of each frame (n,); rejected frames get the number of classes."""
-        rejector, (n, k), found = self._build.rejector, scores.shape, np.asarray(scores.argmax(axis=1))
+        rejector, (n, k), found = self._build.scorer.rejector, scores.shape, np.asarray(scores.argmax(axis=1))
         if rejector is None:
             return found
         lost = self._lost if missing else np.zeros((n, self._frames.bits.shape[1] + self._frames.codes.shape[1]), bool)

@@ -21,9 +21,9 @@ from thenar.drivers.transports import OTHER_PORTS, is_serial
 
 from ..frames import now_us
 from ..harness.wiring import GloveWiring, Harness, Range, StreamWiring
-from ..names import fault, list_names, nearest, shortened
+from ..names import fault, list_names
 from ..sources.base import SOURCES
-from ..sources.rows import RowKind
+from ..sources.rows import RowKind, kind_of
 
 # The prefix of the port of a CyberGlove, which sends nothing unless it is asked.
 CYBERGLOVE = "cyberglove:"
@@ -75,15 +75,6 @@ class Proposal(msgspec.Struct, frozen=True):
         return (*self.harness.switches, *self.harness.taxel_names, *self.harness.sensor_names)
 
 
-def reader_of(wiring: StreamWiring) -> RowReader:
-    """Return a reader of the rows of a stream. Raises SettingError if there is none for its port."""
-    port = wiring.port
-    for kind in SOURCES.values():
-        if isinstance(kind, RowKind) and kind.reader is not None and kind.takes(port):
-            return kind.reader(wiring)
-    raise SettingError(f"{shortened(repr(port))} is not a port for rows{nearest(port, OTHER_PORTS)}")
-
-
 def propose_glove(port: str, baud: int, listen_s: float, columns: Sequence[str] = ()) -> Proposal:
     """Return the glove.toml that fits what `port` sends within `listen_s` seconds after the first row.
 
@@ -97,7 +88,9 @@ def propose_glove(port: str, baud: int, listen_s: float, columns: Sequence[str] 
     bare = StreamWiring(port=port, columns=tuple(columns))
     if is_serial(port):
         bare = msgspec.structs.replace(bare, baud=baud)
-    with reader_of(bare) as reader:
+    kind = SOURCES[kind_of(port)]
+    assert isinstance(kind, RowKind)
+    with kind.reader(bare) as reader:
         chunks: list[tuple[int, bytes]] = []
         if isinstance(reader, LineReader) and not port.startswith(OTHER_PORTS):
             reader.chunks = chunks

@@ -23,7 +23,7 @@ from thenar.drivers.extras import optional
 
 from ..published import HealthReport, JointAngles, LiveGrasp, Preshape
 from .base import Sink, SinkError, SinkKind, SinkPlace
-from .sockets import check_readers, resolve
+from .sockets import resolve
 
 _RATE_HZ = 50
 # Messages queued for one reader, over all topics: about two seconds.
@@ -128,8 +128,7 @@ class FoxgloveServer(Sink):
 
 
 def _open(where: SinkPlace) -> Sink:
-    _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765")
-    check_readers(address, f"foxglove:{where.place}", public="public" in where.options)
+    _, address = resolve(where.place, where.text, "foxglove:127.0.0.1:8765", public="public" in where.options)
     with optional(SinkError, where.text):
         return FoxgloveServer(*address[:2], where=where.text)
 

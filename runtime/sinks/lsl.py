@@ -26,16 +26,16 @@ class LslStreams(Sink):
         self._lsl = load_pylsl(self.where)
         if reason := fault(name):
             raise SettingError(f"lsl:{name!r} is not a valid stream name: it {reason}")
-        self._grasps = self._outlet(name, "Markers", ("grasp",), "string", 0.0)
+        self._grasps = self._outlet(name, "Markers", ("grasp",), "string")
         self._angles: Any = None
         self._joints: tuple[str, ...] = ()
         self._measured: JointAngles | None = None
         self._shown, self._closed = "", False
 
-    def _outlet(self, name: str, kind: str, labels: tuple[str, ...], form: str, rate_hz: float) -> Any:
+    def _outlet(self, name: str, kind: str, labels: tuple[str, ...], form: str) -> Any:
         lsl = self._lsl
         try:
-            info = lsl.StreamInfo(name, kind, len(labels), rate_hz, form, f"thenar {name}")
+            info = lsl.StreamInfo(name, kind, len(labels), lsl.IRREGULAR_RATE, form, f"thenar {name}")
             info.set_channel_labels(list(labels))
             return lsl.StreamOutlet(info)
         except (RuntimeError, ValueError, OSError) as reason:
@@ -54,7 +54,7 @@ class LslStreams(Sink):
             self._measured = angles
             if self._angles is None:
                 self._joints = angles.names
-                self._angles = self._outlet(f"{self._name}-angles", "MoCap", angles.names, "float32", 0.0)
+                self._angles = self._outlet(f"{self._name}-angles", "MoCap", angles.names, "float32")
             if angles.names == self._joints:
                 self._angles.push_sample(list(angles.positions_rad), stamp)
 

@@ -9,6 +9,7 @@ Places are limited. A reader that takes nothing for five seconds is dropped.
 
 import errno
 import ipaddress
+import os
 import re
 import socket
 from contextlib import suppress
@@ -136,45 +137,30 @@ def open_tcp(place: str, *, public: bool = False) -> SocketLines:
     free one. Raises SinkError, or SettingError if `place` is not such an address.
     """
     where = f"tcp:{place}" + "?public" * public
-    family, address = resolve(place, where, "tcp:127.0.0.1:7777")
-    check_readers(address, f"tcp:{place}", public=public)
-    return SocketLines(_listener(family, address, where), where)
+    return SocketLines(listen(place, where, "tcp:127.0.0.1:7777", public=public), where)
 
 
-def check_readers(address: tuple[str, int], where: str, *, public: bool) -> None:
-    """Raise SettingError for an address that other machines can read, unless `public`; `where` is without options."""
-    if not public and not ipaddress.ip_address(address[0].partition("%")[0]).is_loopback:
-        raise SettingError(
-            f"{where}: other machines could read it there: use 127.0.0.1, or write {where}?public to let them"
-        )
+def listen(place: str, where: str, example: str, *, public: bool = True) -> socket.socket:
+    """Return a socket that listens at `place`; arguments and errors are those of `resolve`.
 
-
-def listen(place: str, where: str, example: str) -> socket.socket:
-    """Return a socket that listens at `place`, in the syntax of `open_tcp`; messages use `where` and `example`.
-
-    Raises SinkError, or SettingError if `place` is not an address.
+    Raises SinkError if it cannot be opened.
     """
-    return _listener(*resolve(place, where, example), where)
-
-
-def _listener(family: socket.AddressFamily, address: tuple[str, int], where: str) -> socket.socket:
-    listener = socket.socket(family, socket.SOCK_STREAM)
+    family, address = resolve(place, where, example, public=public)
+    dual = family == socket.AF_INET6 and socket.has_dualstack_ipv6()
     try:
-        # Without it the port stays taken for a minute after its last reader.
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-        listener.listen(_BACKLOG)
+        return socket.create_server(address, family=family, backlog=_BACKLOG, dualstack_ipv6=dual)
     except OSError as reason:
-        listener.close()
         hint = ": another process serves that port; use another" if reason.errno == errno.EADDRINUSE else ""
-        raise SinkError(f"{where} cannot be opened: {reason.strerror}{hint}") from None
-    return listener
+        raise SinkError(f"{where} cannot be opened: {os.strerror(reason.errno or 0)}{hint}") from None
 
 
-def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily, tuple[str, int]]:
+def resolve(
+    place: str, where: str, example: str, *, public: bool = True
+) -> tuple[socket.AddressFamily, tuple[str, int]]:
     """Return the family and the address, host and port first, of HOST:PORT, [HOST]:PORT or a PORT of 127.0.0.1.
 
-    Raises SettingError, with `where` and `example` as in `listen`.
+    Raises SettingError if `place` is not an address, or, unless `public`, one that other machines can read; messages
+    use `where` and `example`.
     """
     found = re.fullmatch(r"(?:(?:\[([^][]+)\]|([^][:]+)):)?([0-9]{1,5})", place)
     if not found or int(found[3]) > 65535:
@@ -184,6 +170,11 @@ def resolve(place: str, where: str, example: str) -> tuple[socket.AddressFamily,
         family, _, _, _, address = socket.getaddrinfo(host, int(found[3]), type=socket.SOCK_STREAM)[0]
     except (OSError, UnicodeError):
         raise SettingError(f"{where}: there is no host {host}: use 127.0.0.1") from None
+    if not public and not ipaddress.ip_address(str(address[0]).partition("%")[0]).is_loopback:
+        bare = where.partition("?")[0]
+        raise SettingError(
+            f"{bare}: other machines could read it there: use 127.0.0.1, or write {bare}?public to let them"
+        )
     return family, address  # type: ignore[return-value]
 
 

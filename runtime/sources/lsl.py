@@ -75,9 +75,4 @@ class LslReader(RowReader):
             self._inlet = None
 
 
-MEMBER = row_kind(
-    "lsl",
-    lambda port: port.startswith("lsl:"),
-    lambda wiring: LslReader(wiring.port),
-    4,
-)
+MEMBER = row_kind("lsl", lambda wiring: LslReader(wiring.port), 4)

@@ -125,9 +125,4 @@ class MqttReader(LineReader):
             self._client = None
 
 
-MEMBER = row_kind(
-    "mqtt",
-    lambda port: port.startswith("mqtt:"),
-    lambda wiring: MqttReader(wiring.port, columns=len(wiring.columns)),
-    6,
-)
+MEMBER = row_kind("mqtt", lambda wiring: MqttReader(wiring.port, columns=len(wiring.columns)), 6)

@@ -82,9 +82,4 @@ class OscReader(LineReader):
         super().open()
 
 
-MEMBER = row_kind(
-    "osc",
-    lambda port: port.startswith("osc:"),
-    lambda wiring: OscReader(wiring.port),
-    7,
-)
+MEMBER = row_kind("osc", lambda wiring: OscReader(wiring.port), 7)

@@ -125,9 +125,4 @@ class RosReader(RowReader):
             self._node = None
 
 
-MEMBER = row_kind(
-    "ros",
-    lambda port: port.startswith("ros:"),
-    lambda wiring: RosReader(wiring.port),
-    5,
-)
+MEMBER = row_kind("ros", lambda wiring: RosReader(wiring.port), 5)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from thenar.drivers.lines import CLOCK_US, SEQUENCES, UNITS_US, Row, RowReader
 from thenar.drivers.senders import SILENCE_US
+from thenar.drivers.transports import OTHER_PORTS
 
 from ..frames import PERIODS, GloveFrame, Mask, SwitchFrame, now_us
 from ..harness.wiring import Harness, Range, StreamWiring
@@ -478,27 +479,26 @@ def steps_of(limits: Range) -> int:
     return int(span) if whole else _TAXEL_STEPS
 
 
-class RowKind(SourceKind, frozen=True):
-    """A kind of source that delivers rows.
+class RowKind(SourceKind, frozen=True, kw_only=True):
+    """A kind of source that delivers rows. `reader` makes the reader of a stream's rows and opens nothing."""
 
-    takes   whether it opens a port of this text; of several kinds the first by rank does
-    reader  makes the reader of a stream's rows; its constructor opens nothing
-    """
-
-    takes: Callable[[str], bool] = lambda _port: False
-    reader: Callable[[StreamWiring], RowReader] | None = None
+    reader: Callable[[StreamWiring], RowReader]
 
 
-def row_kind(
-    name: str, takes: Callable[[str], bool], reader: Callable[[StreamWiring], RowReader], rank: int
-) -> RowKind:
-    """Return a kind of source for the streams whose ports it takes."""
+def kind_of(port: str) -> str:
+    """Return the name of the kind of source that opens a port of rows: its prefix, or "line"."""
+    prefix, colon, _ = port.partition(":")
+    return prefix if prefix + colon in OTHER_PORTS else "line"
+
+
+def row_kind(name: str, reader: Callable[[StreamWiring], RowReader], rank: int) -> RowKind:
+    """Return the kind of source called `name`."""
 
     def sources(
         harness: Harness, _names: Sequence[str], scan: ScanMap, taxels: TaxelCalibration | None
     ) -> Iterator[Source]:
         for number, wiring in enumerate(harness.streams):
-            if takes(wiring.port):
+            if kind_of(wiring.port) == name:
                 yield RowSource(reader(wiring), harness, number, scan, taxels)
 
-    return RowKind(name, sources, rank, takes, reader)
+    return RowKind(name, sources, rank, reader=reader)

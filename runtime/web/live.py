@@ -201,7 +201,7 @@ class FrameText:
 
     def __init__(self, build: Build, harness: Harness) -> None:
         self._switches, self._scale = build.tables.n_switches, build.tables.scale
-        self._none_leads = None if build.rejector is None else build.none_leads
+        self._none_leads = None if build.scorer.rejector is None else build.scorer.none_leads
         self._joints = build.manifest.joints
         calibration = calibration_of(harness.taxel_settings)
         self._taxels = [None if calibration is None else calibration.line(name) for name in harness.taxel_names]

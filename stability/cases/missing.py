@@ -60,7 +60,7 @@ def every_loss(build: Build, width: int, bits: Bits, codes: Codes) -> Iterator[L
         masks = np.array(silent)
         name = f"silent of {n_ports} ports {np.flatnonzero(masks[:n_ports])}, joints {np.flatnonzero(masks[n_ports:])}"
         lost = masks[:n_ports][ports], masks[n_ports:]
-        lanes = [build.scorer.biased_scores_without(*frame, *lost) for frame in zip(bits, codes, strict=True)]
+        lanes = [build.scorer.biased_scores(*frame, *lost) for frame in zip(bits, codes, strict=True)]
         yield Lost(name, *lost, bits, codes, np.array(lanes) - LANE_OFFSET)
 
 

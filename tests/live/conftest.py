@@ -1,6 +1,6 @@
 """A small scene as a subject plays it, builds of it, harnesses for them, and what must be true of what is published.
 
-The oracle is offline: `Scorer.biased_scores_without` on the bits that were shown and the codes that the subject's
+The oracle is offline: `Scorer.biased_scores` on the bits that were shown and the codes that the subject's
 calibration gives to the bytes that were shown.
 """
 
@@ -110,7 +110,7 @@ class Truth:
     def candidate(self, switch_row: int, glove_row: int, lost: Sequence[str]) -> str:
         """Return it with the means of what is lost."""
         without = [np.isin(names, lost) for names in (self.switch_names, self.joint_names)]
-        lanes = self.build.scorer.biased_scores_without(self.bits[switch_row], self.codes[glove_row], *without)
+        lanes = self.build.scorer.biased_scores(self.bits[switch_row], self.codes[glove_row], *without)
         return self.build.grasps[lanes.index(max(lanes))]
 
     def check(self, grasps: Sequence[LiveGrasp], shown: Sequence[Shown]) -> int:

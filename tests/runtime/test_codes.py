@@ -88,7 +88,7 @@ def test_points_of_a_build_that_are_no_line_are_refused() -> None:
 
 def test_a_line_beyond_the_doubles_is_refused() -> None:
     steep = GloveCalibration(subject="anna", sensors=(SensorCalibration("a", 1, -1e308, 2, 1e308),))
-    with pytest.raises(SettingError, match="is not a number"):
+    with pytest.raises(SettingError, match="is far beyond"):
         CodeTables([joint()], ["a"], steep)
 
 

@@ -17,11 +17,12 @@ from thenar.drivers.closing import Closing
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.stream_probe import reader_of
 from thenar.runtime.published import HealthReport, JointAngles, LiveGrasp, Preshape
 from thenar.runtime.sinks import GraspLine, HeaderLine, Line, SinkError, open_sink
 from thenar.runtime.sinks.jsonl import encode, encode_header, encode_health
+from thenar.runtime.sources.base import SOURCES
 from thenar.runtime.sources.mqtt import MqttReader
+from thenar.runtime.sources.rows import RowKind, kind_of
 
 from ..conftest import tool
 from .conftest import eventually, row_source
@@ -242,6 +243,8 @@ def test_a_missing_package_is_named_with_its_extra(monkeypatch: pytest.MonkeyPat
         monkeypatch.delitem(sys.modules, loaded)
     monkeypatch.setitem(sys.modules, module, None)
     stream = parse_harness(GLOVE.format(port=place), "glove.toml").streams[0]
-    for opens in (lambda: open_sink(place), reader_of(stream).open):
+    kind = SOURCES[kind_of(place)]
+    assert isinstance(kind, RowKind)
+    for opens in (lambda: open_sink(place), kind.reader(stream).open):
         with pytest.raises((SettingError, SinkError), match=said):
             opens()

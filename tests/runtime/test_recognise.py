@@ -41,7 +41,7 @@ def test_a_recognition_says_what_the_scores_say(loaded: Build, seed: int) -> Non
 def test_a_lost_input_takes_its_mean_and_degrades_the_frame(loaded: Build) -> None:
     frame, lost = _frame(1), np.arange(9) == 4
     found = loaded.recognise(*frame, lost_switches=lost)
-    lanes = loaded.scorer.biased_scores_without(*frame, lost, np.zeros(3, bool))
+    lanes = loaded.scorer.biased_scores(*frame, lost, np.zeros(3, bool))
     assert found.degraded
     assert found.grasp == loaded.grasps[int(np.argmax(lanes))]
     assert found.margin == np.diff(np.sort(lanes)[-2:])[0]

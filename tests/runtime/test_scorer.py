@@ -48,7 +48,7 @@ def test_scores_are_the_sum_of_the_rows(data: st.DataObject, seed: int, switches
     scorer, none = Scorer(tables), [False] * (switches + joints)
     whole = np.array(scorer.biased_scores(bits, codes)) - LANE_OFFSET
     assert np.array_equal(whole, summed(tables, bits, codes, none[:switches], none[:joints]))
-    degraded = np.array(scorer.biased_scores_without(bits, codes, lost_bits, lost_codes)) - LANE_OFFSET
+    degraded = np.array(scorer.biased_scores(bits, codes, lost_bits, lost_codes)) - LANE_OFFSET
     assert np.array_equal(degraded, summed(tables, bits, codes, lost_bits, lost_codes))
 
 
@@ -59,7 +59,7 @@ def test_a_code_equal_to_a_threshold_goes_left_of_it() -> None:
     for code, bin_ in ((threshold, 2), (threshold + 1, 3)):
         expected = tables.bias.astype(int) + tables.joint_rows[0][bin_] + LANE_OFFSET
         assert scorer.biased_scores([], [code]) == tuple(expected)
-        assert scorer.biased_scores_without([], [code], [], [False]) == tuple(expected)
+        assert scorer.biased_scores([], [code], [], [False]) == tuple(expected)
 
 
 @pytest.mark.parametrize("sign", [+1, -1])
@@ -109,7 +109,7 @@ def test_a_frame_that_does_not_fit_is_refused(bits: ArrayLike, codes: ArrayLike,
 )
 def test_a_mask_that_does_not_fit_is_named(lost_bits: ArrayLike, lost_codes: ArrayLike, reason: str) -> None:
     with pytest.raises(FrameError, match=reason):
-        Scorer(make_tables()).biased_scores_without(np.zeros(9, bool), [0, 0, 0], lost_bits, lost_codes)
+        Scorer(make_tables()).biased_scores(np.zeros(9, bool), [0, 0, 0], lost_bits, lost_codes)
 
 
 def test_every_code_has_its_bins_row_also_when_cached() -> None:

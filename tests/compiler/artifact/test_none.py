@@ -120,7 +120,7 @@ def test_without_rows_of_none_the_requested_share_is_refused(moved: GraspSet, tm
     made = compile_build(held, tmp_path / "build", rounds=20, folds=3, refuse=0.02, jobs=1)
     build, found = Build.load(tmp_path / "build"), made.manifest.detected
     assert build.none is None
-    assert build.rejector is not None
+    assert build.scorer.rejector is not None
     assert made.manifest.rejection is not None
     assert found is not None
     assert found.none is None
@@ -132,7 +132,7 @@ def test_without_rows_of_none_the_requested_share_is_refused(moved: GraspSet, tm
     assert gone[~moved.is_none].mean() <= 0.02
     assert gone[moved.is_none].mean() >= 0.5
     lost = build.scorer.biased_scores(bits[0], codes[0])
-    assert build.rejector.refuses(lost, int(bits[0].sum()), 0, codes[0].tolist()) == gone[0]
+    assert build.scorer.rejector.refuses(lost, int(bits[0].sum()), 0, codes[0].tolist()) == gone[0]
 
 
 def test_frames_are_refused_by_how_far_whole_groups_deviate(moved: GraspSet) -> None:
@@ -160,7 +160,7 @@ def test_without_refusal_the_firmware_says_nothing_of_it(moved: GraspSet, tmp_pa
     )
     assert ["THENAR_GLOVE_NONE 3u" in text for text in header] == [False, True]
     assert [".rejection = &rejection" in text for text in tables] == [False, True]
-    assert Build.load(tmp_path / "0.0").rejector is None
+    assert Build.load(tmp_path / "0.0").scorer.rejector is None
 
 
 def test_compiled_classifiers_refuse_the_frames_that_python_does(moved: GraspSet, tmp_path: Path) -> None:

@@ -107,7 +107,7 @@ def test_a_frame_that_the_compiled_code_does_not_refuse_is_found(
     """On an AVR where inputs are missing: there the answers are those of decide()."""
     for name in TOOLS[kind]:
         tool(name)
-    assert Build.load(build).rejector is not None
+    assert Build.load(build).scorer.rejector is not None
     changed(monkeypatch, "thenar.c", lambda text: text.replace("return outside > ", "return outside > 999u + "))
     found = verify_firmware(build, grasp_set, (kind,))
     wrong = [check.missing for check in found.checks if check.differing]

@@ -66,7 +66,7 @@ def probed(tables: IntegerTables, n: int) -> Probes:
 
 def same_as_python(answers: Predictions, tables: IntegerTables, frames: Probes, lost: Lost | None = None) -> None:
     """Compare every score and class with those of a Build, which inputs are `lost` to."""
-    without = Build(describe(tables), tables).scorer.biased_scores_without
+    without = Build(describe(tables), tables).scorer.biased_scores
     s = tables.n_switches
     gone = np.zeros((len(frames), s + tables.n_joints), bool) if lost is None else lost
     held = zip(frames.bits, frames.codes, gone, strict=True)

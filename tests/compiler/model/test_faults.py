@@ -81,7 +81,7 @@ def test_every_fault_is_counted_as_the_runtime_scores_it(
     def without(*lost: int) -> int:
         mask = np.isin(np.arange(inputs), lost)
         masks = mask[:switches], mask[switches:]
-        lanes = [scorer.biased_scores_without(own, joint, *masks) for own, joint in zip(bits, codes, strict=True)]
+        lanes = [scorer.biased_scores(own, joint, *masks) for own, joint in zip(bits, codes, strict=True)]
         return recognised(lanes, labels, trials)
 
     assert found.total == len(set(trials.tolist()))

@@ -131,7 +131,7 @@ def test_the_runtime_sums_as_arrays_do_without_lost_inputs(seed: int) -> None:
     lost = np.arange(integers.n_joints) % 2 == seed % 2
     for row in range(len(bits)):
         assert (np.array(scorer.biased_scores(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
-        left = np.array(scorer.biased_scores_without(bits[row], codes[row], np.zeros(4, bool), lost)) - LANE_OFFSET
+        left = np.array(scorer.biased_scores(bits[row], codes[row], np.zeros(4, bool), lost)) - LANE_OFFSET
         for joint in np.flatnonzero(lost).tolist():
             mine = integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes[row, joint])].astype(
                 int
@@ -196,12 +196,12 @@ def test_a_missing_joint_adds_its_mean_and_gives_pairs_code_0(seed: int) -> None
         meant = integers.scores(bits[row : row + 1], asked)[0]
         for joint in np.flatnonzero(lost).tolist():
             meant = meant + integers.joint_means[joint] - integers.joint_rows[joint][0]
-        left = np.array(scorer.biased_scores_without(bits[row], codes[row], np.zeros(3, bool), lost)) - LANE_OFFSET
+        left = np.array(scorer.biased_scores(bits[row], codes[row], np.zeros(3, bool), lost)) - LANE_OFFSET
         assert (left == meant).all()
         assert np.abs(left).max() <= integers.bound
     every = np.ones(JOINTS, bool)
     for held in (None, tuple(codes[0].tolist())):
-        none = scorer.biased_scores_without([False] * 3, codes[0], [False] * 3, every if held is None else ~every)
+        none = scorer.biased_scores([False] * 3, codes[0], [False] * 3, every if held is None else ~every)
         assert scorer.state_scores(0, 0, held) == none
 
 

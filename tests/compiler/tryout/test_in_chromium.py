@@ -81,7 +81,7 @@ def differing(build: Build, frames: list[list[list[int]]], answers: list[dict[st
     for number, ((bits, codes, lost, lost_joints), told) in enumerate(zip(frames, answers, strict=True)):
         flags = [np.array(each, bool) for each in (bits, lost, lost_joints)]
         said = build.recognise(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
-        lanes = build.scorer.biased_scores_without(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
+        lanes = build.scorer.biased_scores(flags[0], np.array(codes, np.uint16), flags[1], flags[2])
         scores = [lane - 32768 for lane in lanes]
         whole = (said.grasp, said.margin, said.degraded) == (told["grasp"], told["margin"], told["degraded"])
         probable = abs(said.probability - told["probabilities"][told["number"]]) < 1e-12
@@ -123,7 +123,7 @@ def test_all_rows_have_pythons_scores_and_answers(trier: Trier, tmp_path: Path, 
 def test_the_page_predicts_none_as_python_does(trier: Trier, with_none_too: GraspSet, tmp_path: Path) -> None:
     for name, grasp_set in (("class", with_none_too), ("refusing", make_set())):
         build = compiled(grasp_set, tmp_path / name, rounds=8)
-        assert (build.rejector is None) == (name == "class")
+        assert (build.scorer.rejector is None) == (name == "class")
         trier.open_file(tmp_path / name / "report.html", "#try")
         warned = trier.script("return document.getElementById('empty-hand')?.checkVisibility() ?? false")
         assert warned == (name == "refusing")

@@ -44,7 +44,7 @@ def recording(build: Build, seed: int) -> list[Row]:
         elif random.random() < 0.3:
             closed ^= 1 << random.randrange(SWITCHES)
         bits = np.array([closed >> switch & 1 for switch in range(SWITCHES)], bool)
-        whole = scorer.biased_scores_without(bits, list(sensors), np.zeros(SWITCHES, bool), np.zeros(JOINTS, bool))
+        whole = scorer.biased_scores(bits, list(sensors), np.zeros(SWITCHES, bool), np.zeros(JOINTS, bool))
         rows.append(Row(closed, sensors, tuple(whole)))
     return rows
 

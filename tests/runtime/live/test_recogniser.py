@@ -90,7 +90,7 @@ def definition(build: Build, arrivals: list[Arrival]) -> dict[str, Any]:
     bits = flags(0) if no_switches else flags(switches.closed)
     codes = [0, 0, 0] if no_glove else [glove.sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)]
     absent = np.array([code == 0 for code in codes])  # a byte of 0 is a sensor that was not measured
-    lanes = Scorer(tables).biased_scores_without(bits, codes, lost, absent)
+    lanes = Scorer(tables).biased_scores(bits, codes, lost, absent)
     weights = [np.abs(row.astype(int)).sum() for row in tables.switch_rows]
     joints = np.array([np.ptp(rows.astype(int), axis=0).sum() for rows in tables.joint_rows])
     weight_lost = sum(np.array(weights)[lost]) + sum(joints[absent])

@@ -76,7 +76,7 @@ def model_of(tables: IntegerTables, knows_none: bool, seed: int) -> SegmentModel
 
 
 def scores_of(build: Build, frames: Probes, lost: Lost) -> NDArray[np.int64]:
-    s, without = build.tables.n_switches, build.scorer.biased_scores_without
+    s, without = build.tables.n_switches, build.scorer.biased_scores
     held = zip(frames.bits, frames.codes, lost, strict=True)
     return np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
 
