@@ -268,23 +268,15 @@ def _with_substitutes(
     """Return tables whose substitutes of lost inputs differ from the mean contributions in the person's frames, which
     they are in `made`, as much as they did before.
     """
-    switch_means, joint_means = made.switch_means.astype(np.float64), made.joint_means.astype(np.float64)
-    ratio, rows = made.scale / old.scale, made.switch_rows
-    share = bits.sum(axis=0)[:, np.newaxis] / len(bits)
-    shares = adaptation.shares(adaptation.everything)
-    switch_means += adaptation.with_new((old.switch_means - share * old.switch_rows) * ratio, shares)
+    share, shares = bits.sum(axis=0)[:, np.newaxis] / len(bits), adaptation.shares(adaptation.everything)
+    apart = [*(old.switch_means - share * old.switch_rows)]
     for joint, column in enumerate(codes.T):
         contribution = sum(term.of(column).astype(np.int64).sum(axis=0) for term in old.of_joint(joint))
-        possible = made.choices(joint)[1]
-        joint_means[joint] += adaptation.with_new((old.joint_means[joint] - contribution / len(codes)) * ratio, shares)
-        joint_means[joint] = np.clip(joint_means[joint], possible.min(axis=0), possible.max(axis=0))
-    switch_means = np.clip(switch_means, np.minimum(rows, 0), np.maximum(rows, 0))
-    found = replace(
-        made,
-        switch_means=np.rint(switch_means).astype(np.int16),
-        joint_means=np.rint(joint_means).astype(np.int16),
-    )
-    return in_bytes(found)
+        apart.append(old.joint_means[joint] - contribution / len(codes))
+    means, s = np.vstack([made.switch_means, made.joint_means]), made.n_switches
+    more = adaptation.with_new(np.reshape(apart, (len(means), old.n_classes)) * (made.scale / old.scale), shares)
+    whole = np.rint(np.clip(means + more, *made.ends)).astype(np.int16)
+    return in_bytes(replace(made, switch_means=whole[:s], joint_means=whole[s:]))
 
 
 def _wider(

@@ -78,9 +78,7 @@ def fit_lost(
     switch_rows = tables.switch_rows.astype(np.int64)
     closed, joints = bits.astype(np.int64) @ switch_rows, tables.joint_sums(codes).astype(np.int64)
     whole = closed + joints
-    added = [tables.choices(joint)[1] for joint in range(tables.n_joints)]
-    ends = np.minimum(switch_rows, 0), np.maximum(switch_rows, 0)
-    spans = tuple(np.array([end(rows, axis=0) for rows in added]).reshape(-1, len(wanted)) for end in (np.min, np.max))
+    ends, spans = zip(*((end[: tables.n_switches], end[tables.n_switches :]) for end in tables.ends), strict=True)
     # For each varying input, and then for all of its kind if the other kind varies: the scores without it.
     of_switches, of_joints = (np.flatnonzero((least != most).any(axis=1)) for least, most in (ends, spans))
     switches = [whole - bits[:, switch, np.newaxis] * switch_rows[switch] for switch in of_switches]

@@ -191,6 +191,15 @@ class IntegerTables(Additive):
         rows = sum((slope.of(codes) for slope in slopes), bins.of(codes)).astype(np.int16)
         return Bins(joint, thresholds.astype(np.uint16), rows)
 
+    @cached_property
+    def ends(self) -> tuple[Steps, Steps]:
+        """The least and the most that each input alone adds, (s + j, K): switches first."""
+        added = [np.stack([0 * row, row]) for row in self.switch_rows]
+        added += [self.choices(joint)[1] for joint in range(self.n_joints)]
+        shape = len(added), self.n_classes
+        least, most = (np.array([end(each, axis=0) for each in added], np.int64) for end in (np.min, np.max))
+        return least.reshape(shape), most.reshape(shape)
+
     @property
     def missing(self) -> Steps:
         """What each missing input adds to an open switch, or to code 0 of a joint, (s + j, K): switches first."""

@@ -156,20 +156,13 @@ def quantise(
     s, j, K = tables.n_switches, tables.n_joints, tables.n_classes
     none = np.zeros((s + j, K), np.int16)
     integers = IntegerTables(bias.astype(np.int16), terms, none[:s], none[s:], scale, grid)
-    rows = integers.switch_rows
-    switch_means = np.rint(balanced.switch_rows * means[:, np.newaxis] * scale)
-    joint_means = []
+    added = [*(balanced.switch_rows * means[:, np.newaxis])]
     lines = {line.joint: line for line in balanced.lines}
     for joint, (column, bins) in enumerate(zip(codes.T, balanced.bins, strict=True)):
-        added = bins.of(column) + (lines[joint].of(column) if joint in lines else 0.0)
-        # A mean computed in floating point may round to just outside the range of its values, and so of int16.
-        mean, possible = np.rint(_mean(added) * scale), integers.choices(joint)[1]
-        joint_means.append(np.clip(mean, possible.min(axis=0), possible.max(axis=0)))
-    return replace(
-        integers,
-        switch_means=np.clip(switch_means, np.minimum(rows, 0), np.maximum(rows, 0)).astype(np.int16),
-        joint_means=np.array(joint_means, np.int16).reshape(j, K),
-    )
+        added.append(_mean(bins.of(column) + (lines[joint].of(column) if joint in lines else 0.0)))
+    # A mean computed in floating point may round to just outside the range of its values, and so of int16.
+    whole = np.clip(np.rint(np.reshape(added, (s + j, K)) * scale), *integers.ends).astype(np.int16)
+    return replace(integers, switch_means=whole[:s], joint_means=whole[s:])
 
 
 def in_bytes(tables: IntegerTables) -> IntegerTables:
@@ -177,13 +170,9 @@ def in_bytes(tables: IntegerTables) -> IntegerTables:
 
     Each is the nearest one that is not beyond what its input can add, so no sum leaves its bounds.
     """
-    s, shift, rows = tables.n_switches, tables.missing_shifts[:, np.newaxis], tables.switch_rows
-    missing = tables.missing
+    s, shift, missing = tables.n_switches, tables.missing_shifts[:, np.newaxis], tables.missing
     zero = np.vstack([tables.switch_means, tables.joint_means]) - missing
-    possible = [np.stack([0 * row, row]).astype(np.int64) for row in rows]
-    possible += [tables.choices(joint)[1] for joint in range(tables.n_joints)]
-    ends = (np.array([end(each, axis=0) for each in possible], np.int64) for end in (np.min, np.max))
-    least, most = (end.reshape(zero.shape) - zero for end in ends)
+    least, most = (end - zero for end in tables.ends)
     steps = np.rint(missing / 2**shift).astype(np.int64)
     # Shifts round down.
     steps = np.clip(steps, np.maximum(-(-least >> shift), -127), np.minimum(most >> shift, 127))
