@@ -217,12 +217,13 @@ function chain(bone, lengths, bends) {
 }
 
 function posedHand(joints) {
-  const [forearm, palm] = [draw("path", { class: "flesh" }), draw("path", { class: "flesh" })];
+  // Points are no style, as a path is: that they change costs less.
+  const [forearm, palm] = [draw("polyline", { class: "flesh" }), draw("polygon", { class: "flesh" })];
   const digits = Object.entries(DIGITS).map(([digit, { width }]) => {
     const parts = [
-      draw("path", { class: "edge", "stroke-width": width }),
-      draw("path", { class: "bone", "stroke-width": width - 1.6 }),
-      draw("path", { class: "axis" }),
+      draw("polyline", { class: "edge", "stroke-width": width }),
+      draw("polyline", { class: "bone", "stroke-width": width - 1.6 }),
+      draw("polyline", { class: "axis" }),
     ];
     return { digit, parts, group: draw("g", {}, draw("title", {}, digit), ...parts) };
   });
@@ -234,14 +235,14 @@ function posedHand(joints) {
     joints.forEach((joint, at) => {
       if (own[at] !== null) (angles[joint.digit] ??= {})[joint.moves] = degrees(joint, own[at]);
     });
-    const pose = posed(angles), line = (points, closed) => path(points.map((point) => point.map((value) => value.toFixed(1))), closed);
-    forearm.setAttribute("d", line(pose.forearm, false));
-    palm.setAttribute("d", line(pose.palm, true));
+    const pose = posed(angles), line = (points) => points.map(([x, y]) => `${x.toFixed(1)} ${(-y).toFixed(1)}`).join(" ");
+    forearm.setAttribute("points", line(pose.forearm));
+    palm.setAttribute("points", line(pose.palm));
     // A part of the hand is marked while one of its joints is lost.
     const lost = new Set(joints.filter((_, at) => own[at] === null).map(({ digit }) => digit));
     for (const { digit, parts, group } of digits) {
-      const d = line(pose.chains[digit], false);
-      for (const part of parts) part.setAttribute("d", d);
+      const points = line(pose.chains[digit]);
+      for (const part of parts) part.setAttribute("points", points);
       group.classList.toggle("gone", lost.has(digit));
     }
     palm.classList.toggle("gone", lost.has("palm") || lost.has("wrist"));

@@ -6,7 +6,6 @@ import { $, clearedPen, colours, paced, redraw, say, WORDS_MS } from "./wire.js"
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
-const FOLLOW_MS = 100; // the lanes of a run move ten times a second at most
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
@@ -102,7 +101,7 @@ export class Timeline {
   #moved = 0;
   #stale = true; // the lanes, and not just the cursor
   #paint = paced(() => this.#draw());
-  #follow = paced(() => this.#draw(), FOLLOW_MS);
+  #follow = paced(() => this.#draw(), WORDS_MS);
   #say = paced(() => this.#read(), WORDS_MS);
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
