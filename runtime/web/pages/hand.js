@@ -140,11 +140,6 @@ class Glove {
     const reach = Math.max(2 * this.#hand.radius_mm, Math.min(2 * FINGER * unit, this.spacing / 2));
     for (const { area } of this.spots) area.setAttribute("r", reach.toFixed(2));
   }
-
-  get said() {
-    const switches = this.spots.filter(({ disc }) => !disc), closed = switches.filter(({ count }) => count).length;
-    return switches.length ? `: ${closed} of ${switches.length} switches closed` : "";
-  }
 }
 
 function spacing(places) {
@@ -295,8 +290,7 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
   svg.replaceChildren(glove.group, ...joints.map(({ group }) => group));
   svg.classList.add("hand");
   svg.setAttribute("role", onSwitch ? "group" : "img");
-  const say = () => svg.setAttribute("aria-label", `The hand${onSwitch ? "" : glove.said}`);
-  say();
+  svg.setAttribute("aria-label", "The hand");
 
   let wide = -1;
   const arrange = () => {
@@ -323,10 +317,7 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
   new ResizeObserver(arrange).observe(svg);
 
   return {
-    setClosed(bits, lost) {
-      glove.setClosed(bits, lost);
-      if (!onSwitch) say();
-    },
+    setClosed: (bits, lost) => glove.setClosed(bits, lost),
     setTaxels: (values) => glove.setTaxels(values),
     setPose(values) {
       for (const part of joints) part.set(values);
