@@ -176,6 +176,8 @@ def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run
 def test_only_readable_switches_are_counted(page: Callable[..., Run], browser: Any) -> None:
     run = page()
     run.until(lambda: browser.text("hand-says") == "2 of 3 switches closed: a, b")
+    # The drawing is named by them.
+    assert browser.driver.find_element("id", "hand").accessible_name == "Hand 2 of 3 switches closed: a, b"
     lost = replace(GRASP, grasp="unknown", candidate="unknown", health="unknown", lost=("a", "b", "c"))
     run.until(lambda: browser.text("hand-says") == "0 of 0 readable switches closed; 3 lost", grasp=lost)
     part = replace(GRASP, health="degraded", lost=("a",))
@@ -330,6 +332,28 @@ def test_what_is_painted_at_one_time_is_painted_in_one_frame(page: Callable[...,
     # The last call counts, however soon it came; and what is asked for at once is not put off.
     assert len(seen["once"]) == 2
     run.until(lambda: browser.text("grasp") == "Add")
+
+
+# Whether the lanes are drawn in the next frame of the screen after each of two announced types.
+_LANES = """const [done] = arguments;
+    import("/timeline.js").then(async ({ Timeline }) => {
+      const canvas = document.getElementById("timeline"), drawn = [];
+      const lanes = new Timeline(canvas, {}), pen = canvas.getContext("2d");
+      lanes.begin({ grasps: ["Add", "PoS"], silent_us: 500_000 });
+      pen.fillText = () => { drawn[drawn.length - 1] = true; };
+      for (const [us, name] of [[1_000_000, "Add"], [1_010_000, "PoS"]]) {
+        drawn.push(false);
+        lanes.follow([[us, name, "", "", null]], us);
+        await new Promise(requestAnimationFrame);
+      }
+      done(drawn);
+    });"""
+
+
+def test_an_announced_type_is_on_its_lane_at_once(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    run.until(lambda: browser.text("grasp") == "Add")
+    assert browser.driver.execute_async_script(_LANES) == [True, True]
 
 
 def recording(predictions: list[Any], others: list[Any], truth: list[Any]) -> dict[str, Any]:
