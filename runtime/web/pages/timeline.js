@@ -58,6 +58,13 @@ function after(lane, us) {
   return low;
 }
 
+/** Return the parts of a lane's spans from a moment to another. */
+export function within(lane, from, to) {
+  const spans = lane.slice(Math.max(after(lane, from) - 1, 0), after(lane, to));
+  const inside = spans.filter((span) => span.to > from && span.from < to);
+  return inside.map((span) => ({ name: span.name, from: Math.max(span.from, from), to: Math.min(span.to, to) }));
+}
+
 /** Return whether a prediction is wrong: "unknown" is none. */
 export const differs = (announced, truth) => announced !== truth && announced !== "unknown";
 
@@ -68,11 +75,8 @@ export const differs = (announced, truth) => announced !== truth && announced !=
 function errors(truth, announced) {
   const wrong = [], early = [];
   for (const { from, to, name } of truth) {
-    const inside = announced.slice(Math.max(after(announced, from) - 1, 0), after(announced, to)).filter((span) => span.to > from);
-    const right = inside.find((span) => span.name === name)?.from ?? -Infinity;
-    for (const span of inside.filter((one) => differs(one.name, name))) {
-      (span.from < right ? early : wrong).push({ from: Math.max(span.from, from), to: Math.min(span.to, to), name: span.name });
-    }
+    const inside = within(announced, from, to), right = inside.find((span) => span.name === name)?.from ?? -Infinity;
+    for (const span of inside.filter((one) => differs(one.name, name))) (span.from < right ? early : wrong).push(span);
   }
   return { wrong, early };
 }

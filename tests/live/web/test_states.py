@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from msgspec import to_builtins
 from msgspec.structs import replace
@@ -354,6 +355,26 @@ def test_an_announced_type_is_on_its_lane_at_once(page: Callable[..., Run], brow
     run = page()
     run.until(lambda: browser.text("grasp") == "Add")
     assert browser.driver.execute_async_script(_LANES) == [True, True]
+
+
+_WITHIN = """const [lane, spans, done] = arguments;
+    import("/timeline.js").then(({ within }) => done(spans.map(([from, to]) => within(lane, from, to))));"""
+
+
+def test_parts_of_a_lane_are_those_of_a_search_of_all_spans(page: Callable[..., Run], browser: Any) -> None:
+    rng = np.random.default_rng(7)
+    run = page()
+    run.until(lambda: browser.text("grasp") == "Add")
+    times = np.unique(rng.integers(0, 60, 30)).tolist()
+    lane = [{"from": start, "to": end, "name": f"{start}"} for start, end in pairwise(times) if rng.random() < 0.7]
+    spans = [
+        [start, start + wide]
+        for start, wide in zip(rng.integers(-5, 65, 300).tolist(), rng.integers(1, 30, 300).tolist(), strict=True)
+    ]
+    found = browser.driver.execute_async_script(_WITHIN, lane, spans)
+    for (first, last), parts in zip(spans, found, strict=True):
+        clipped = [{**one, "from": max(one["from"], first), "to": min(one["to"], last)} for one in lane]
+        assert parts == [one for one in clipped if one["from"] < one["to"]]
 
 
 def recording(predictions: list[Any], others: list[Any], truth: list[Any]) -> dict[str, Any]:
