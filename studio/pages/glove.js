@@ -121,7 +121,7 @@ function stale() {
   document.documentElement.classList.add("old");
   $("problem").disabled = true;
   say($("problem"), "Watch to look for problems");
-  say($("counted"), states.length ? `not watched since ${clock(performance.now())}` : "not watched");
+  say($("counted"), states.length ? `not watched since ${clock()}` : "not watched");
 }
 
 function choose(sensor) {

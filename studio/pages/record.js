@@ -58,6 +58,7 @@ const ask = openPage({
     say($("seen-heading"), `Trial ${trial}: ${grasp}, ${thing}`);
     if (drawn) hand ??= drawHand($("hand"), drawn);
     hand?.setClosed(closed);
+    $("hand").setAttribute("aria-label", `The hand: ${closed.filter(Boolean).length} of ${closed.length} switches closed`);
     hand?.setTaxels(pressed);
     hand?.setPose(values);
   },

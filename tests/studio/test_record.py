@@ -1,6 +1,7 @@
 """The page *Record*, in Chromium as a person uses it, with an emulated glove, and through its WebSocket."""
 
 import json
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -152,6 +153,8 @@ def test_a_collection_by_clicks_and_by_keys_becomes_a_set_and_a_build(
     grasp = browser.text("seen-heading").split(": ")[1].split(",")[0]
     held = {"PoS": 3, "Tip": 1, "Lat": 1}[grasp]
     assert len(browser.driver.find_elements(By.CSS_SELECTOR, "#hand .closed")) == held
+    name = browser.driver.find_element(By.ID, "hand").accessible_name
+    assert re.fullmatch(rf"The hand: {held} of [0-9]+ switches closed", name)
     browser.picture("record-trials")
     browser.driver.find_element(By.CSS_SELECTOR, "#keys [data-key=accept]").click()
     browser.wait(lambda: browser.text("end-heading") == "Recorded: Anna.grasps")

@@ -140,11 +140,6 @@ class Glove {
     const reach = Math.max(2 * this.#hand.radius_mm, Math.min(2 * FINGER * unit, this.spacing / 2));
     for (const { area } of this.spots) area.setAttribute("r", reach.toFixed(2));
   }
-
-  get said() {
-    const switches = this.spots.filter(({ disc }) => !disc), closed = switches.filter(({ count }) => count).length;
-    return switches.length ? `: ${closed} of ${switches.length} switches closed` : "";
-  }
 }
 
 function spacing(places) {
@@ -217,12 +212,13 @@ function chain(bone, lengths, bends) {
 }
 
 function posedHand(joints) {
-  const [forearm, palm] = [draw("path", { class: "flesh" }), draw("path", { class: "flesh" })];
+  // Points are no style, as a path is: that they change costs less.
+  const [forearm, palm] = [draw("polyline", { class: "flesh" }), draw("polygon", { class: "flesh" })];
   const digits = Object.entries(DIGITS).map(([digit, { width }]) => {
     const parts = [
-      draw("path", { class: "edge", "stroke-width": width }),
-      draw("path", { class: "bone", "stroke-width": width - 1.6 }),
-      draw("path", { class: "axis" }),
+      draw("polyline", { class: "edge", "stroke-width": width }),
+      draw("polyline", { class: "bone", "stroke-width": width - 1.6 }),
+      draw("polyline", { class: "axis" }),
     ];
     return { digit, parts, group: draw("g", {}, draw("title", {}, digit), ...parts) };
   });
@@ -234,14 +230,14 @@ function posedHand(joints) {
     joints.forEach((joint, at) => {
       if (own[at] !== null) (angles[joint.digit] ??= {})[joint.moves] = degrees(joint, own[at]);
     });
-    const pose = posed(angles), line = (points, closed) => path(points.map((point) => point.map((value) => value.toFixed(1))), closed);
-    forearm.setAttribute("d", line(pose.forearm, false));
-    palm.setAttribute("d", line(pose.palm, true));
+    const pose = posed(angles), line = (points) => points.map(([x, y]) => `${x.toFixed(1)} ${(-y).toFixed(1)}`).join(" ");
+    forearm.setAttribute("points", line(pose.forearm));
+    palm.setAttribute("points", line(pose.palm));
     // A part of the hand is marked while one of its joints is lost.
     const lost = new Set(joints.filter((_, at) => own[at] === null).map(({ digit }) => digit));
     for (const { digit, parts, group } of digits) {
-      const d = line(pose.chains[digit], false);
-      for (const part of parts) part.setAttribute("d", d);
+      const points = line(pose.chains[digit]);
+      for (const part of parts) part.setAttribute("points", points);
       group.classList.toggle("gone", lost.has(digit));
     }
     palm.classList.toggle("gone", lost.has("palm") || lost.has("wrist"));
@@ -294,8 +290,7 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
   svg.replaceChildren(glove.group, ...joints.map(({ group }) => group));
   svg.classList.add("hand");
   svg.setAttribute("role", onSwitch ? "group" : "img");
-  const say = () => svg.setAttribute("aria-label", `The hand${onSwitch ? "" : glove.said}`);
-  say();
+  svg.setAttribute("aria-label", "The hand");
 
   let wide = -1;
   const arrange = () => {
@@ -322,10 +317,7 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
   new ResizeObserver(arrange).observe(svg);
 
   return {
-    setClosed(bits, lost) {
-      glove.setClosed(bits, lost);
-      if (!onSwitch) say();
-    },
+    setClosed: (bits, lost) => glove.setClosed(bits, lost),
     setTaxels: (values) => glove.setTaxels(values),
     setPose(values) {
       for (const part of joints) part.set(values);

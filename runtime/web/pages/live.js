@@ -1,6 +1,6 @@
 // The page of a run, or of a recording: hands messages on, sends requests, and plays.
 import { openPage } from "./shell.js";
-import { differs, spanAt, Timeline } from "./timeline.js";
+import { differs, spanAt, Timeline, within } from "./timeline.js";
 import { View } from "./view.js";
 import { $, say } from "./wire.js";
 
@@ -23,11 +23,10 @@ function linked() {
   return Number.isFinite(seconds) ? seconds : null;
 }
 
-function longest(announced, { from, to }, until) {
+function longest(announced, { from, to }) {
   const lengths = new Map();
-  for (const span of announced) {
-    const length = Math.min(span.to, to, until) - Math.max(span.from, from);
-    if (length > 0) lengths.set(span.name, (lengths.get(span.name) ?? 0) + length);
+  for (const span of within(announced, from, to)) {
+    lengths.set(span.name, (lengths.get(span.name) ?? 0) + span.to - span.from);
   }
   return [...lengths].sort(([, one], [, other]) => other - one)[0]?.[0];
 }
@@ -162,7 +161,7 @@ class Replay {
   // Say how many labelled trials each build recognises: a trial is right if its type was announced for longest.
   #rate() {
     const { truth, tracks } = timeline;
-    const right = tracks.map(({ announced, untilUs }) => truth.map((span) => longest(announced, span, untilUs) === span.name));
+    const right = tracks.map(({ announced }) => truth.map((span) => longest(announced, span) === span.name));
     const words = right.map((found, number) => {
       const count = found.filter(Boolean).length, name = tracks[number].name || "This build";
       return `${name} recognises ${count} of ${truth.length} labelled trials, ${((100 * count) / truth.length).toFixed(0)} %.`;

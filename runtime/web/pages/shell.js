@@ -31,14 +31,14 @@ export function openPage(handlers) {
   const own = {
     work,
     shell: show,
-    open: () => badge("link", "good", `page: connected since ${clock(performance.now())}`),
+    open: () => badge("link", "good", `page: connected since ${clock()}`),
     closed: () => {
-      badge("link", "bad", `page: not connected since ${clock(performance.now())}`);
+      badge("link", "bad", `page: not connected since ${clock()}`);
       clearTimeout(lasts);
       if (!$("glove-state").hidden) badge("glove-state", "warn", "glove: not known");
     },
     glove: ({ is, words, lasts_s: until }) => {
-      const since = clock(performance.now());
+      const since = clock();
       clearTimeout(lasts);
       if (until) lasts = setTimeout(() => badge("glove-state", "bad", `glove: silent since ${since}`), 1000 * until);
       badge("glove-state", is, words && `glove: ${words}`);

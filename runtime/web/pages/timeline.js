@@ -1,12 +1,12 @@
 // One axis of time for runs and recordings: lanes of spans on a canvas, a cursor, zoom, and keys. All times are in
 // microseconds since 1970.
 import { typeStyles } from "./types.js";
-import { $, clearedPen, colours, paced, redraw, say, WORDS_MS } from "./wire.js";
+import { $, clock, paced, say, WORDS_MS } from "./wire.js";
 
 const LETTERS = 14, LABEL = 20, BAR = 24, FOOT = 22; // pixels of a lane's name, of its spans, and of the axis
 const LEAST_US = 100_000, USUAL_US = 30_000_000, TICK = 90; // shortest window, the first one of a run, pixels a tick
 const KEPT_US = 1_200_000_000, MOST_SPANS = 20_000; // of a run, by lane
-const FOLLOW_MS = 100; // the lanes of a run move ten times a second at most
+const DARK = matchMedia("(prefers-color-scheme: dark)");
 const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600, 14_400]; // seconds
 
 /** Spans {from, to, name} of what a build announced, of its segments, and of its troubles; the last one may be open. */
@@ -58,6 +58,13 @@ function after(lane, us) {
   return low;
 }
 
+/** Return the parts of a lane's spans from a moment to another. */
+export function within(lane, from, to) {
+  const spans = lane.slice(Math.max(after(lane, from) - 1, 0), after(lane, to));
+  const inside = spans.filter((span) => span.to > from && span.from < to);
+  return inside.map((span) => ({ name: span.name, from: Math.max(span.from, from), to: Math.min(span.to, to) }));
+}
+
 /** Return whether a prediction is wrong: "unknown" is none. */
 export const differs = (announced, truth) => announced !== truth && announced !== "unknown";
 
@@ -68,17 +75,14 @@ export const differs = (announced, truth) => announced !== truth && announced !=
 function errors(truth, announced) {
   const wrong = [], early = [];
   for (const { from, to, name } of truth) {
-    const inside = announced.slice(Math.max(after(announced, from) - 1, 0), after(announced, to)).filter((span) => span.to > from);
-    const right = inside.find((span) => span.name === name)?.from ?? -Infinity;
-    for (const span of inside.filter((one) => differs(one.name, name))) {
-      (span.from < right ? early : wrong).push({ from: Math.max(span.from, from), to: Math.min(span.to, to), name: span.name });
-    }
+    const inside = within(announced, from, to), right = inside.find((span) => span.name === name)?.from ?? -Infinity;
+    for (const span of inside.filter((one) => differs(one.name, name))) (span.from < right ? early : wrong).push(span);
   }
   return { wrong, early };
 }
 
 /** Return a duration as "1:02.3". */
-function clock(seconds, digits = 1) {
+function lasting(seconds, digits = 1) {
   const whole = Math.max(seconds, 0), hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
   const rest = (whole % 60).toFixed(digits).padStart(digits ? 3 + digits : 2, "0");
   return `${hours ? `${hours}:${String(minutes).padStart(2, "0")}` : minutes}:${rest}`;
@@ -102,7 +106,7 @@ export class Timeline {
   #moved = 0;
   #stale = true; // the lanes, and not just the cursor
   #paint = paced(() => this.#draw());
-  #follow = paced(() => this.#draw(), FOLLOW_MS);
+  #follow = paced(() => this.#draw(), WORDS_MS);
   #say = paced(() => this.#read(), WORDS_MS);
 
   /** @param {{moved: function(): void, toggle: function(): void}} on the cursor has moved; the key that plays was pressed */
@@ -118,7 +122,8 @@ export class Timeline {
     for (const kind of ["down", "move", "up", "cancel"]) {
       canvas.addEventListener(`pointer${kind}`, (event) => this.#pointer(kind, event));
     }
-    redraw(canvas, () => this.draw());
+    new ResizeObserver(() => this.draw()).observe(canvas);
+    DARK.addEventListener("change", () => this.draw());
     const actions = { closer: "+", wider: "-", "next-error": "n", "last-error": "p", now: "End" };
     for (const [id, key] of Object.entries(actions)) $(id).addEventListener("click", () => this.#keys[key]());
     addEventListener("keydown", (event) => this.#key(event));
@@ -138,6 +143,7 @@ export class Timeline {
     if (this.tracks[0].untilUs - until > 1_000_000) [this.tracks, this.first, this.at] = [[new Track()], null, null];
     const [track] = this.tracks, known = track.untilUs ?? -1;
     if (until < known) return; // changes that were sent before passed it
+    const before = track.announced.at(-1);
     if (known >= 0 && changes[0][0] - known > this.#silent) track.end();
     // A silence begins at the last moment before it.
     for (const change of changes) if (change[0] > known || (change[0] === known && !change[1])) track.take(change);
@@ -150,7 +156,7 @@ export class Timeline {
     this.last = until;
     if (this.at === null) this.#from = until - this.#span;
     this.#stale = true;
-    this.#follow();
+    this.#follow(track.announced.at(-1) !== before);
     this.#say();
   }
 
@@ -180,8 +186,8 @@ export class Timeline {
   get reading() {
     if (this.last === null) return this.live ? "no frame yet" : "not read yet";
     const at = this.at ?? this.last, parts = [];
-    if (this.live) parts.push(this.at === null ? "now" : `${clock((this.last - at) / 1e6)} ago`, time(at));
-    else parts.push(`${clock((at - this.first) / 1e6, 2)} of ${clock((this.last - this.first) / 1e6)}`, time(at));
+    if (this.live) parts.push(this.at === null ? "now" : `${lasting((this.last - at) / 1e6)} ago`, clock(at / 1000));
+    else parts.push(`${lasting((at - this.first) / 1e6, 2)} of ${lasting((this.last - this.first) / 1e6)}`, clock(at / 1000));
     const truth = spanAt(this.truth, at);
     if (truth) parts.push(`truth ${truth.name}`);
     for (const track of this.tracks) {
@@ -224,8 +230,14 @@ export class Timeline {
     const lanes = this.#lanes(), high = lanes.length * (LABEL + BAR) + FOOT, wide = this.canvas.clientWidth;
     if (this.canvas.style.height !== `${high}px`) this.canvas.style.height = `${high}px`;
     if (!wide) return;
-    [this.#wide, this.#colours] = [wide, colours()];
-    const pen = clearedPen(this.canvas), x = (us) => ((us - this.#from) / this.#span) * wide;
+    this.#wide = wide;
+    // Of each colour the page's style has one for light pages and one for dark ones.
+    const css = getComputedStyle(document.body), colour = (name) => css.getPropertyValue(`--${name}`).match(/#\w+/g)[DARK.matches ? 1 : 0];
+    this.#colours = Object.fromEntries(["text", "soft", "page", "line", "warn", "bad"].map((name) => [name, colour(name)]));
+    // A new size clears it.
+    [this.canvas.width, this.canvas.height] = [wide, high].map((size) => Math.round(size * devicePixelRatio));
+    const pen = this.canvas.getContext("2d"), x = (us) => ((us - this.#from) / this.#span) * wide;
+    pen.scale(devicePixelRatio, devicePixelRatio);
     pen.font = `${LETTERS}px system-ui, sans-serif`;
     pen.textBaseline = "middle";
     lanes.forEach(([name, ...bars], number) => this.#lane(pen, x, wide, name, bars, number * (LABEL + BAR)));
@@ -271,7 +283,7 @@ export class Timeline {
     const base = this.live ? 0 : this.first ?? 0, digits = step < 0.1 ? 2 : step < 1 ? 1 : 0;
     pen.fillStyle = this.#colours.soft;
     for (let tick = Math.ceil((this.#from - base) / 1e6 / step) * step; base + tick * 1e6 <= this.#from + this.#span; tick += step) {
-      const left = x(base + tick * 1e6), text = this.live ? time(tick * 1e6) : clock(tick, digits);
+      const left = x(base + tick * 1e6), text = this.live ? clock(tick * 1000) : lasting(tick, digits);
       if (tick < 0) continue;
       pen.fillRect(left, high - FOOT, 1, 5);
       pen.fillText(text, Math.min(Math.max(left - pen.measureText(text).width / 2, 0), wide - pen.measureText(text).width), high - FOOT / 2 + 3);
@@ -367,5 +379,3 @@ export class Timeline {
     if (this.last !== null) this.#keys[key]();
   }
 }
-
-const time = (unixUs) => new Date(unixUs / 1000).toTimeString().slice(0, 8);

@@ -93,8 +93,8 @@ export class View {
 
   #look() {
     const age = this.#readAt === null ? 0 : performance.now() - this.#readAt, silent = age > this.#silent;
-    const since = this.#readAt === null ? " yet" : ` since ${clock(this.#readAt)}`, old = !this.#link || silent;
-    say($("age"), this.#link === false ? `no data${since}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "");
+    const since = () => (this.#readAt === null ? "yet" : `since ${clock(Date.now() - age)}`), old = !this.#link || silent;
+    say($("age"), this.#link === false ? `no data ${since()}` : silent ? `this is ${(age / 1000).toFixed(1)} s old` : "");
     if (old === this.#old) return;
     this.#old = old;
     document.documentElement.classList.toggle("old", old);

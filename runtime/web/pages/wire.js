@@ -1,11 +1,9 @@
-// Parts of every page: elements, texts, tables and menus; and when and how a canvas is painted.
-
-const DARK = "(prefers-color-scheme: dark)";
+// Parts of every page: elements, texts, tables and menus, and when something is painted.
 
 export const $ = (id) => document.getElementById(id);
 
-/** Return the time of day of a moment of performance.now(): "10:24:07". */
-export const clock = (at) => new Date(Date.now() - performance.now() + at).toTimeString().slice(0, 8);
+/** Return the time of day, now or of a moment in milliseconds since 1970: "10:24:07". */
+export const clock = (ms = Date.now()) => new Date(ms).toTimeString().slice(0, 8);
 
 /** Return a new element with these properties or attributes, and texts and elements in it. */
 export function make(kind, settings = {}, ...children) {
@@ -94,27 +92,4 @@ export function paced(paint, ms = 0) {
       paint();
     });
   };
-}
-
-/** Return the pen of a canvas, which is made as large as it is shown, and cleared: its unit is a pixel of the page. */
-export function clearedPen(canvas) {
-  const pen = canvas.getContext("2d");
-  const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.round(size * devicePixelRatio));
-  if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-  pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
-  pen.clearRect(0, 0, wide, high);
-  return pen;
-}
-
-/** Return the page's colours by their names: of each its style has one for light pages and one for dark ones. */
-export function colours() {
-  const css = getComputedStyle(document.body), at = matchMedia(DARK).matches ? 1 : 0;
-  const names = ["text", "soft", "page", "line", "warn", "bad"];
-  return Object.fromEntries(names.map((name) => [name, css.getPropertyValue(`--${name}`).match(/#\w+/g)[at]]));
-}
-
-/** Let a canvas be drawn anew when its size or the page's colours change. */
-export function redraw(canvas, paint) {
-  new ResizeObserver(paint).observe(canvas);
-  matchMedia(DARK).addEventListener("change", paint);
 }

@@ -84,7 +84,7 @@ def bars_are(browser: Any, scene: Any) -> bool:
 def test_the_posed_hand_follows_the_joints(run: Callable[[], Any], browser: Any) -> None:
     running = run()
     browser.open(running.page.server.url)
-    bones = "return [...document.querySelectorAll('#hand .bone')].map((bone) => bone.getAttribute('d'))"
+    bones = "return [...document.querySelectorAll('#hand .bone')].map((bone) => bone.getAttribute('points'))"
     shown(browser, running.scene, 0)
     before = browser.script(bones)
     assert len(before) == 5

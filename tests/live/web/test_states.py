@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from msgspec import to_builtins
 from msgspec.structs import replace
@@ -176,6 +177,8 @@ def test_a_slow_source_is_old_after_three_of_its_periods(page: Callable[..., Run
 def test_only_readable_switches_are_counted(page: Callable[..., Run], browser: Any) -> None:
     run = page()
     run.until(lambda: browser.text("hand-says") == "2 of 3 switches closed: a, b")
+    # The drawing is named by them.
+    assert browser.driver.find_element("id", "hand").accessible_name == "Hand 2 of 3 switches closed: a, b"
     lost = replace(GRASP, grasp="unknown", candidate="unknown", health="unknown", lost=("a", "b", "c"))
     run.until(lambda: browser.text("hand-says") == "0 of 0 readable switches closed; 3 lost", grasp=lost)
     part = replace(GRASP, health="degraded", lost=("a",))
@@ -330,6 +333,48 @@ def test_what_is_painted_at_one_time_is_painted_in_one_frame(page: Callable[...,
     # The last call counts, however soon it came; and what is asked for at once is not put off.
     assert len(seen["once"]) == 2
     run.until(lambda: browser.text("grasp") == "Add")
+
+
+# Whether the lanes are drawn in the next frame of the screen after each of two announced types.
+_LANES = """const [done] = arguments;
+    import("/timeline.js").then(async ({ Timeline }) => {
+      const canvas = document.getElementById("timeline"), drawn = [];
+      const lanes = new Timeline(canvas, {}), pen = canvas.getContext("2d");
+      lanes.begin({ grasps: ["Add", "PoS"], silent_us: 500_000 });
+      pen.fillText = () => { drawn[drawn.length - 1] = true; };
+      for (const [us, name] of [[1_000_000, "Add"], [1_010_000, "PoS"]]) {
+        drawn.push(false);
+        lanes.follow([[us, name, "", "", null]], us);
+        await new Promise(requestAnimationFrame);
+      }
+      done(drawn);
+    });"""
+
+
+def test_an_announced_type_is_on_its_lane_at_once(page: Callable[..., Run], browser: Any) -> None:
+    run = page()
+    run.until(lambda: browser.text("grasp") == "Add")
+    assert browser.driver.execute_async_script(_LANES) == [True, True]
+
+
+_WITHIN = """const [lane, spans, done] = arguments;
+    import("/timeline.js").then(({ within }) => done(spans.map(([from, to]) => within(lane, from, to))));"""
+
+
+def test_parts_of_a_lane_are_those_of_a_search_of_all_spans(page: Callable[..., Run], browser: Any) -> None:
+    rng = np.random.default_rng(7)
+    run = page()
+    run.until(lambda: browser.text("grasp") == "Add")
+    times = np.unique(rng.integers(0, 60, 30)).tolist()
+    lane = [{"from": start, "to": end, "name": f"{start}"} for start, end in pairwise(times) if rng.random() < 0.7]
+    spans = [
+        [start, start + wide]
+        for start, wide in zip(rng.integers(-5, 65, 300).tolist(), rng.integers(1, 30, 300).tolist(), strict=True)
+    ]
+    found = browser.driver.execute_async_script(_WITHIN, lane, spans)
+    for (first, last), parts in zip(spans, found, strict=True):
+        clipped = [{**one, "from": max(one["from"], first), "to": min(one["to"], last)} for one in lane]
+        assert parts == [one for one in clipped if one["from"] < one["to"]]
 
 
 def recording(predictions: list[Any], others: list[Any], truth: list[Any]) -> dict[str, Any]:
