@@ -21,8 +21,9 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     studio = Studio(project, address, token=token, jobs=jobs, page=page)
     GlovePage(studio)
     RecordPage(studio, WearerPage(studio))
-    ErrorsPage(studio, ChoosePage(studio))
+    choose = ChoosePage(studio)
+    ErrorsPage(studio, choose)
     StudioLive(studio)
-    add_compare_page(studio)
+    add_compare_page(studio, choose)
     studio.changed()
     return studio

@@ -1,5 +1,5 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { interval, listBoxes, percent, points, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
+import { interval, percent, points, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
 import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
@@ -15,9 +15,13 @@ const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
   project: ({ sets, state: { aside, took } }) => {
-    listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name })), ({ target }) => {
-      ask("use", { id: target.value, value: Number(target.checked) });
-    });
+    const ids = String(sets.map(({ id }) => id));
+    // Boxes that stay keep the focus.
+    if (ids !== $("sets").dataset.ids) {
+      const use = ({ target }) => ask("use", { id: target.value, value: Number(target.checked) });
+      $("sets").replaceChildren(...sets.map(({ id, name }) => box(name, use, { value: id })));
+      $("sets").dataset.ids = ids;
+    }
     sets.forEach(({ name }, at) => ($("sets").children[at].control.checked = !aside.includes(name)));
     const known = ["measure", "curve", "train"].filter((what) => took[what] !== undefined);
     say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");

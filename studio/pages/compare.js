@@ -1,5 +1,5 @@
-// The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { interval, listBoxes, points, scanTime } from "./choice.js";
+// The page Compare: two builds of the project on the same trials, and the report of one of them.
+import { interval, points, scanTime } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -7,49 +7,47 @@ import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 
 const SIGNS = { both: "ab", a: "a", b: "b" };
 
+let numbering; // of the recordings in use
+
 const ask = openPage({
-  project: ({ builds, sets, state }) => {
+  project: ({ builds, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
     for (const id of ["b", "build"]) fillMenu($(id), builds, current);
     $("no-build").hidden = builds.length > 0;
-    // They are compared on all sets unless some are unticked.
-    listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name, checked: !state.aside.includes(name) })), changed);
-    $("compare").disabled = $("report").disabled = $("firmware").disabled = !builds.length;
+    $("compare").disabled = $("report").disabled = !builds.length;
     commands();
   },
-  targets: ({ targets }) => {
-    fillMenu($("target"), targets.map(([id, help]) => ({ id, name: `${id}: ${help}` })), targets[0][0]);
-    commands();
+  set: (set) => {
+    say($("on"), set.why || `On the recordings in use: ${set.name}.`);
+    if (numbering !== set.numbering) changed();
+    numbering = set.numbering;
   },
-  commands: (commands) => {
-    for (const what of ["compare", "report", "firmware"]) say($(`${what}-command`), commands[what]);
-    $("compare").disabled = !commands.compare;
+  commands: ({ report, compare }) => {
+    say($("report-command"), report);
+    say($("compare-command"), compare);
+    $("compare").disabled = !compare;
   },
   compare: (compared) => {
-    if (String(compared.ids) === String(request())) show(compared);
+    if (String(compared.ids) === String(request()) && compared.numbering === numbering) show(compared);
   },
-  report: (made) => exported(made),
-  firmware: (made) => exported(made),
+  report: ({ said, address, name }) => {
+    say($("exported"), said);
+    $("download").replaceChildren(make("a", { href: address, download: name }, `Save ${name}`));
+    commands();
+  },
 });
 
-const request = () => [$("a"), $("b"), ...$("sets").querySelectorAll(":checked")].map(({ value }) => value);
+const request = () => [$("a").value, $("b").value];
 
 /** Ask for the commands that do what the buttons do. */
 function commands() {
-  if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value, ids: request() });
+  if ($("build").value) ask("commands", { id: $("build").value, ids: request() });
 }
 
-function exported({ said, address, name }) {
-  say($("exported"), said);
-  $("download").replaceChildren(make("a", { href: address, download: name }, `Save ${name}`));
-  commands();
-}
-
-function show({ builds, hand, both, only, found, said, unused }) {
+function show({ builds, hand, both, only, found, said }) {
   $("result").hidden = false;
   say($("said"), said);
-  list($("unused"), unused);
   const rows = [
     ["Recognised of these trials", ({ right, ends: [low, high] }) => interval({ mean: right / found.trials, low, high })],
     ["Sensors", (build) => build.sensors],
@@ -102,11 +100,9 @@ function changed() {
 }
 
 for (const id of ["a", "b"]) $(id).addEventListener("change", changed);
+$("build").addEventListener("change", commands);
 $("compare").addEventListener("click", () => {
   $("result").hidden = true;
   ask("compare", { ids: request() });
 });
-for (const name of ["report", "firmware"]) {
-  $(name).addEventListener("click", () => ask(name, { id: $("build").value, name: $("target").value }));
-}
-for (const id of ["build", "target"]) $(id).addEventListener("change", commands);
+$("report").addEventListener("click", () => ask("report", { id: $("build").value }));

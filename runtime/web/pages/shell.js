@@ -7,7 +7,7 @@ const FIRST_MS = 250, LONGEST_MS = 5000; // before it connects again
 /** What the server does, in words. */
 export const WORK = {
   reading: "reading", measure: "measuring", curve: "measuring the curve", train: "training", adapt: "adapting",
-  compare: "comparing", report: "exporting", firmware: "writing firmware",
+  compare: "comparing", report: "exporting",
 };
 
 /**
