@@ -75,7 +75,6 @@ class RecordPage:
         self._studio.publish(
             "recordings",
             unfinished=found,
-            taxonomies=["kamakura14", "cutkosky16", "feix33", "own"],
             objects=self._objects is not None,
             glove=self._project.harness.exists(),
         )
@@ -167,22 +166,21 @@ class RecordPage:
     def _start(
         self, recording: Path, collection: Collection, journal: Journal | None = None, *, command: str = ""
     ) -> None:
-        sitting = Sitting(self._studio, recording, collection, journal)
+        sitting = Sitting(self._studio, recording, collection, journal, command)
         self._studio.station.start("recording", partial(self._lead, sitting), KEYS)
-        self._studio.publish("record-command", command=command)
 
     def _lead(self, sitting: "Sitting", stop: Event) -> None:
         """Lead a collection, and write the set of all its accepted trials when it ends."""
-        self._sitting = sitting
-        self._studio.publish("finished", set="")
+        self._sitting, written = sitting, dict[str, object]()
         try:
             if done := sitting.lead(stop):
-                self._write(sitting, done)
+                written = self._write(sitting, done)
         finally:
+            self._studio.publish("collecting", written, stage="over")
             self._studio.changed()
 
-    def _write(self, sitting: "Sitting", done: int) -> None:
-        """Write the set of the accepted trials.
+    def _write(self, sitting: "Sitting", done: int) -> dict[str, object]:
+        """Write the set of the accepted trials, and return what pages show of it.
 
         What was recorded for a build has its codes, on whichever page it was continued. Once it is complete, it adapts
         the build, if it is the wearer's.
@@ -192,11 +190,11 @@ class RecordPage:
         codings = None if build is None else build[1].manifest.codings
         grasp_set, report = import_recordings([sitting.recording], codings=codings)
         grasp_set.save(sitting.output)
+        if build is not None and done == total:
+            self._studio.queue("adapt", partial(self._wearer.adapt, collection.subject))
         warnings = [finding.message for finding in report.warnings]
         about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
-        self._studio.publish("finished", about, done=done, total=total)
-        if build is not None and done == total and collection.subject == self._project.state.wearer:
-            self._studio.queue("adapt", partial(self._wearer.adapt, [sitting.output]))
+        return about | {"done": done, "total": total}
 
 
 class Sitting:
@@ -213,6 +211,8 @@ class Sitting:
         Its file.
     collection, journal
         As for `collect`.
+    command : str
+        What does the same in a terminal; "" if no command does.
 
     Attributes
     ----------
@@ -227,9 +227,11 @@ class Sitting:
         If there are too many trials, or the glove's files cannot be read.
     """
 
-    def __init__(self, studio: Studio, recording: Path, collection: Collection, journal: Journal | None) -> None:
+    def __init__(
+        self, studio: Studio, recording: Path, collection: Collection, journal: Journal | None, command: str
+    ) -> None:
         self._studio, self._project = studio, studio.project
-        self.recording, self.collection, self._journal = recording, collection, journal
+        self.recording, self.collection, self._journal, self._command = recording, collection, journal, command
         self.output, self._adapts = recording.with_suffix(".grasps"), bool(collection.build)
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
@@ -244,13 +246,10 @@ class Sitting:
         """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
         self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
         # Those of the collection before are no longer shown.
-        self._studio.publish("trials", set="", trials=(), types=(), accuracy=None)
+        self._studio.publish("trials", set="", trials=(), types=(), accuracy=None, command=self._command)
         if self._journal is not None:
             self._captured = _captured(self.recording)
-        try:
-            return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
-        finally:
-            self._studio.publish("collecting", stage="over")
+        return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
 
     def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
         """Show the guide's state ten times a second and at every change; return the keys pressed."""
@@ -298,7 +297,7 @@ class Sitting:
             edited = [(trial, made.get(trial.number, trial.grasp)) for trial in trials]
             accuracy = self._accuracy([one for one in edited if one[1] not in ("", NONE)])
             about = {"set": self.output.name, "trials": shown, "types": types, "accuracy": accuracy}
-            self._studio.publish("trials", about)
+            self._studio.publish("trials", about, command=self._command)
 
     def _id(self, trial: Trial) -> TrialId:
         """Return the name of a trial in the log: that in its set, which `import_recordings` makes as one session."""

@@ -20,8 +20,6 @@ const ask = openPage({
     say($("result-heading"), `Adapted: ${result.folder}, from ${result.total} trials`);
     say($("before"), result.before);
     say($("after"), result.after);
-    const [type, count, , after] = result.types[0];
-    say($("worst"), `${type}: ${after} of ${count}`);
     list($("warnings"), result.warnings);
     const styles = typeStyles(result.types.map(([name]) => name));
     const rows = result.types.map(([name, ...counts]) => [tag(styles, name), ...counts]);

@@ -104,11 +104,6 @@ def test_recordings_that_cannot_be_used_leave_a_wearer_recording_and_undo(studio
     assert "/C.grasps" not in shown["adapt"]
 
 
-def test_a_wearer_whose_recordings_are_not_read_yet_is_asked_to_wait(worn: Path, hand: HandShape) -> None:
-    with open_studio(Project(worn, hand), "127.0.0.1:0", token=None) as opened:
-        assert "not read yet" in refusal(opened, do="adapt")
-
-
 def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:
     opened = studio()
     shutil.rmtree(tmp_path / "recorded")

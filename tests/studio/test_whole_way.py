@@ -104,7 +104,7 @@ def test_from_an_empty_folder_to_an_exported_recogniser(
     go(browser, "Record")
     browser.wait(lambda: browser.texts("#taxonomy option"))
     fill(browser, "subject", "Anna")
-    Select(browser.driver.find_element(By.ID, "taxonomy")).select_by_value("own")
+    Select(browser.driver.find_element(By.ID, "taxonomy")).select_by_visible_text("own")
     fill(browser, "types", "fist, pinch, point")
     fill(browser, "repetitions", "4")
     browser.click("none")
