@@ -11,6 +11,7 @@ let hand = null;
 let boxes = [];
 let chosen = []; // numbers of sensors, in the order in which they were chosen
 let shown = null; // the last reply
+let front = []; // the points of the curve, and their spots
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
@@ -73,6 +74,7 @@ function mark() {
   const bits = set.sensors.map((_, sensor) => chosen.includes(sensor));
   hand.setClosed(bits);
   boxes.forEach((box, sensor) => (box.checked = bits[sensor]));
+  for (const { sensors, spot } of front) spot.setAttribute("aria-pressed", key(sensors) === key(chosen));
 }
 
 function listSensors() {
@@ -115,33 +117,29 @@ function certify() {
 
 /* ---- The curve: what sensors are worth, as a table and as a front of points to click on ---- */
 
-/** Return the worth of the last sensor of a point, in words. */
-const worth = ({ worth: gain }) => gain && `${points(gain.mean)} [${percent(gain.low)}, ${percent(gain.high)}]`;
-
-/** Choose the sensors with these names. */
-const chooseNamed = (names) => choose(names.map((name) => set.sensors.findIndex((one) => one.name === name)));
-
-function drawCurve({ points: found, of, enough }) {
+function drawCurve({ points: named, of, enough }) {
   $("curve-panel").hidden = false;
+  const number = new Map(set.sensors.map(({ name }, sensor) => [name, sensor]));
+  const found = named.map((point) => ({ ...point, sensors: point.sensors.map((name) => number.get(name)) }));
   const titles = ["Sensors", `${of}, %`, "Worth of the last, points", "After 2 own trials, %", ""];
   fillTable("points", titles, found.map((point) => {
-    const { number, mean, low, high, adapted } = point;
+    const { number, mean, low, high, adapted, worth } = point;
     return [
       number === enough ? `${number}: more matter little` : number,
       `${percent(mean)} [${percent(low)}, ${percent(high)}]`,
-      worth(point) ?? "–",
+      worth ? `${points(worth.mean)} [${percent(worth.low)}, ${percent(worth.high)}]` : "–",
       adapted === null ? "–" : percent(adapted),
-      button(`Choose these ${number}`, () => chooseNamed(point.sensors)),
+      button(`Choose these ${number}`, () => choose(point.sensors)),
     ];
   }));
   $("points").children[found.findIndex(({ number }) => number === enough)]?.setAttribute("aria-current", "true");
-  drawFront(found, of);
-  detail(found.find(({ number }) => number === enough), of);
+  drawFront(found);
+  mark();
 }
 
 const BOX = { left: 52, right: 470, top: 10, bottom: 262 };
 
-function drawFront(found, of) {
+function drawFront(found) {
   const svg = $("front"), most = Math.max(...found.map(({ number }) => number));
   const x = (number) => BOX.left + (number / (most + 0.5)) * (BOX.right - BOX.left);
   const y = (share) => BOX.bottom - share * (BOX.bottom - BOX.top);
@@ -156,8 +154,8 @@ function drawFront(found, of) {
   const line = found.map(({ number, mean }) => `${x(number)} ${y(mean)}`).join("L");
   parts.push(draw("path", { class: "front", d: `M${line}` }));
   svg.replaceChildren(...parts);
-  for (const point of found) {
-    const { number } = point;
+  front = found.map((point) => {
+    const { number, sensors } = point;
     const spot = draw(
       "g",
       { class: "point" },
@@ -165,21 +163,9 @@ function drawFront(found, of) {
       draw("circle", { class: "open", cx: x(number), cy: y(point.mean), r: 5 }),
       draw("rect", { class: "area", x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
     );
-    svg.append(pressable(spot, `${number} sensors: ${interval(point)}`, () => detail(point, of)));
-  }
-}
-
-/** Show what a point of the front is. */
-function detail(point, of) {
-  const { number } = point;
-  for (const spot of $("front").querySelectorAll(".point")) {
-    spot.setAttribute("aria-pressed", spot.getAttribute("aria-label").startsWith(`${number} sensors`));
-  }
-  say($("point-heading"), `${number} ${number === 1 ? "sensor" : "sensors"}: ${interval(point)}, ${of}`);
-  tell("point-about", point.worth && `the last one is worth ${worth(point)} points`);
-  say($("point-sensors"), point.sensors.join(", "));
-  say($("point-choose"), number === 1 ? "Choose this sensor" : `Choose these ${number} sensors`);
-  $("point-choose").onclick = () => chooseNamed(point.sensors);
+    svg.append(pressable(spot, `Choose these ${number}: ${interval(point)}`, () => choose(sensors)));
+    return { sensors, spot };
+  });
 }
 
 for (const what of ["measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));
