@@ -31,7 +31,6 @@ const ask = openPage({
   "glove-state": (message) => showState(message),
   shown: (message) => plot(message),
   calibrating: (message) => showStep(message),
-  calibrated: ({ said }) => say($("calibrated"), said),
 });
 
 /** A page that is opened while nothing uses the glove begins to watch it. */
@@ -165,10 +164,11 @@ $("problem").addEventListener("click", () => {
   } else ask("watch");
 });
 
-function showStep({ step, what, problems, faults, keys }) {
+function showStep({ step, what, problems, faults, keys, said = "" }) {
   const open = Boolean(step);
   if (open && $("calibration").hidden) say($("refused"), "");
   $("calibration").hidden = !open;
+  say($("calibrated"), said);
   if (!open) return;
   say($("step"), step);
   say($("what"), what);
