@@ -42,14 +42,13 @@ class Member(msgspec.Struct, frozen=True):
 class State(msgspec.Struct, forbid_unknown_fields=True):
     """What is remembered in studio.json.
 
-    build, former  the names of the build in use, and of the one before it was adapted
-    wearer         the name of the person
-    aside          the names of the sets that are left aside
-    took           the seconds that each kind of work last took
+    build   the name of the build in use
+    wearer  the name of the person
+    aside   the names of the sets that are left aside
+    took    the seconds that each kind of work last took
     """
 
     build: str = ""
-    former: str = ""
     wearer: str = "me"
     aside: tuple[str, ...] = ()
     took: dict[str, float] = {}

@@ -24,12 +24,11 @@ from thenar.compiler.recordings.taxonomy import ANY, Taxonomy, collected, tasks_
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.calibration import RAW
 from thenar.runtime.files import write_atomically
-from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
+from thenar.runtime.frames import now_us
 from thenar.runtime.glove import Glove
 from thenar.runtime.published import NONE, DeviceHealth
 from thenar.runtime.recording.guide import KEYS, CollectionGuide, Journal, Key, Trial, planned, read_journal
-from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label
+from thenar.runtime.recording.session import Collection
 from thenar.runtime.web.server import message
 
 from .collecting import collect, standing, task
@@ -45,7 +44,6 @@ _OFTEN, _TAUGHT = 2, 3
 _SHOW_US = 100_000
 # From this number of trials of every type on there is an accuracy.
 _LEAST = 2
-Frames = tuple[SwitchFrame | None, GloveFrame | None]
 
 
 class RecordPage:
@@ -238,7 +236,7 @@ class Sitting:
         self._sensors = GloveSensors(self._project)
         # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
         # step and the time.
-        self._captured = dict[int, Frames]()
+        self._captured = {} if journal is None else dict(journal.captured)
         self._accepted: Sequence[int] | None = None
         self._shown, self._telling = (-1, 0), Lock()
 
@@ -247,8 +245,6 @@ class Sitting:
         self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
         # Those of the collection before are no longer shown.
         self._studio.publish("trials", set="", trials=(), types=(), accuracy=None, command=self._command)
-        if self._journal is not None:
-            self._captured = _captured(self.recording)
         return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
 
     def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
@@ -364,21 +360,6 @@ def _begun(path: Path, _size: int, _changed_ns: int) -> tuple[Collection, int, i
         return _collection(journal), len(journal.accepted), len(planned(_collection(journal)))
     except (ThenarError, OSError):
         return None
-
-
-def _captured(recording: Path) -> dict[int, Frames]:
-    """Return the frames that were captured in each trial of a recording, the last time."""
-    switches: SwitchFrame | None = None
-    glove: GloveFrame | None = None
-    found = dict[int, Frames]()
-    for entry in Reader(recording):
-        if isinstance(entry, SwitchFrame):
-            switches = entry
-        elif isinstance(entry, GloveFrame):
-            glove = entry
-        elif isinstance(entry, Label) and entry.event == "captured":
-            found[entry.trial] = switches, glove
-    return found
 
 
 def _collection(journal: Journal) -> Collection:

@@ -58,7 +58,7 @@ class WearerPage:
         record += ["-o", self._project.new_path(wearer, ".grasps", ".mcap")]
         shown = [f"{path.name}: {size}" for path, size in sets.items()]
         about |= {"base": base.name, "types": types, "sets": shown, "glove": self._project.harness.exists()}
-        about |= {"build": state.build, "undo": self._former, "record": self._project.command(record)}
+        about |= {"build": state.build, "record": self._project.command(record)}
         self._studio.publish("wearing", about, wearer=wearer, why="")
 
     def base(self) -> tuple[Path, Build]:
@@ -73,14 +73,6 @@ class WearerPage:
         if base is None:
             raise SettingError(f"{path.name} was adapted, and the project no longer has the build that it was made of")
         return base
-
-    @property
-    def _former(self) -> str:
-        """The name of the build that was in use before it was adapted; "" if that is gone, or none was adapted."""
-        state, found = self._project.state, self._project.build()
-        there = {member.name for member in self._project.members("build")}
-        adapted = found is not None and found[1].manifest.adapted is not None
-        return state.former if adapted and state.former in there else ""
 
     def _sets(self, wearer: str, build: Build, report: Report) -> dict[Path, str]:
         """Return the sets of which all trials are a wearer's, and which have the build's inputs; and their sizes."""
@@ -126,14 +118,16 @@ class WearerPage:
             raise SettingError(f"no set holds only trials of {wearer}: record some")
         trials, output = self._project.recordings(paths)[0], self._project.new_path(wearer)
         made = adapt(base, trials, output=output, add_type=_added(trials, build))
-        self._project.remember(build=output.name, former=self._project.state.build)
+        self._project.remember(build=output.name)
         self._studio.changed()
         return _result(made)
 
-    def _undo(self, asked: Asked) -> None:
-        if not self._former:
-            raise SettingError("there is nothing to undo: the build in use was not adapted here")
-        self._project.remember(build=self._former, former="")
+    def _undo(self, _: Asked) -> None:
+        """Use the build of everybody again."""
+        base = self.base()[0].name
+        if base == self._project.state.build:
+            raise SettingError(f"there is nothing to undo: {base} is that of everybody")
+        self._project.remember(build=base)
         self._studio.changed()
 
 

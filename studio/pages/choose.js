@@ -2,9 +2,7 @@
 import { interval, percent, points, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
-import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
-
-const KINDS = { switch: "Switches", pad: "Pads", joint: "Joints" };
+import { $, box, button, fillTable, list, say, tell } from "./wire.js";
 
 let set = null; // the message on the set
 let hand = null;
@@ -73,23 +71,15 @@ function choose(sensors) {
 function mark() {
   const bits = set.sensors.map((_, sensor) => chosen.includes(sensor));
   hand.setClosed(bits);
-  boxes.forEach((box, sensor) => (box.checked = bits[sensor]));
+  boxes.forEach(({ control }, sensor) => (control.checked = bits[sensor]));
   for (const { sensors, spot } of front) spot.setAttribute("aria-pressed", key(sensors) === key(chosen));
 }
 
 function listSensors() {
-  boxes = [];
-  const groups = Object.entries(KINDS).map(([kind, title]) => {
-    const inside = make("div");
-    set.sensors.forEach(({ name, kind: own, price }, sensor) => {
-      if (own !== kind) return;
-      const label = box(price === null ? name : `${name}, ${price.toFixed(2)}`, () => toggle(sensor));
-      inside.append(label);
-      boxes[sensor] = label.control;
-    });
-    return inside.children.length ? make("fieldset", {}, make("legend", {}, title), inside) : null;
+  boxes = set.sensors.map(({ name, kind, price }, sensor) => {
+    return box(`${name}, ${kind}${price === null ? "" : `, ${price.toFixed(2)}`}`, () => toggle(sensor));
   });
-  $("list").replaceChildren(...groups.filter(Boolean));
+  $("list").replaceChildren(...boxes);
 }
 
 function show(reply) {

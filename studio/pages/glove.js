@@ -46,8 +46,6 @@ function showGlove(message) {
   $("with-glove").hidden = !about.there;
   if (about.why) say($("refused"), about.why);
   $("ports").replaceChildren(...about.ports.map((port) => new Option(port)));
-  const ports = about.ports.length ? `Ports here: ${about.ports.join(", ")}. ` : "";
-  say($("addresses"), `${ports}Or tcp://HOST:PORT, udp://0.0.0.0:PORT, ble://NAME, the path of a serial port, or cyberglove:PORT for a CyberGlove.`);
   if (!about.hand) return;
   hand = drawHand($("hand"), about.hand, { onSwitch: (sensor) => choose(sensor) });
   $("hand").hidden = !about.hand.switches.length && !about.hand.taxels.length && !about.hand.joints.length;

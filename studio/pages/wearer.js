@@ -36,9 +36,9 @@ const ask = openPage({
   },
 });
 
-function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt = "", glove, record, undo }) {
+function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt = "", glove, record }) {
   say($("use"), build === base ? `${build}: that of everybody` : `${build}: adapted from ${base}`);
-  tell("undo", undo && `Undo: use ${undo} again`);
+  tell("undo", build !== base && `Undo: use ${base} again`);
   say($("plan"), glove ? `Two trials of each of ${types.length} types; three if you add one.` : "The project has no glove.toml: connect a glove first.");
   for (const one of $("record").elements) one.disabled = !glove;
   say($("record-command"), record);

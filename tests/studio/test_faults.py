@@ -29,7 +29,6 @@ from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.web.server import message
-from thenar.studio.opening import open_studio
 from thenar.studio.project import Project
 from thenar.studio.studio import Station, Studio
 

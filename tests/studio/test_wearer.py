@@ -95,16 +95,16 @@ def test_a_build_is_adapted_to_its_wearer_and_back(
 
 
 def test_an_adaptation_of_an_adapted_build_is_one_of_everybodys(browser: Browser, studio: Start, folder: Path) -> None:
-    """And undone in steps."""
+    """And that is what is used again after it is undone."""
     begun(browser, studio(None))
     adapted(browser)
     browser.wait(lambda: browser.text("adapt-command").endswith("C-2"))
     browser.click("adapt")
     browser.wait(lambda: browser.text("use") == "C-2: adapted from more")
     assert (folder / "C" / "tables.bin").read_bytes() == (folder / "C-2" / "tables.bin").read_bytes()
-    assert browser.text("undo") == "Undo: use C again"
+    assert browser.text("undo") == "Undo: use more again"
     browser.click("undo")
-    browser.wait(lambda: browser.text("use") == "C: adapted from more")
+    browser.wait(lambda: browser.text("use") == "more: that of everybody")
 
 
 def test_another_wearer_has_other_recordings_and_is_remembered(
