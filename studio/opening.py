@@ -3,7 +3,7 @@
 from thenar.drivers.extras import optional
 
 from .choose import ChoosePage
-from .compare import add_compare_page
+from .compare import ComparePage
 from .errors import ErrorsPage
 from .glove import GlovePage
 from .live import StudioLive
@@ -24,6 +24,6 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     choose = ChoosePage(studio)
     ErrorsPage(studio, choose)
     StudioLive(studio)
-    add_compare_page(studio, choose)
+    ComparePage(studio, choose)
     studio.changed()
     return studio

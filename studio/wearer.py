@@ -33,7 +33,6 @@ class WearerPage:
         requests: dict[str, Handler] = {
             "wearer": self._name,
             "adapt": lambda _: partial(self.adapt, self._project.state.wearer),
-            "unwear": self._undo,
         }
         studio.add(requests, self.read)
 
@@ -57,8 +56,9 @@ class WearerPage:
         record = ["record", "--glove", self._project.harness, "--for", base, "--subject", wearer]
         record += ["-o", self._project.new_path(wearer, ".grasps", ".mcap")]
         shown = [f"{path.name}: {size}" for path, size in sets.items()]
+        ids = {one.name: one.id for one in self._project.members("build")}
         about |= {"base": base.name, "types": types, "sets": shown, "glove": self._project.harness.exists()}
-        about |= {"build": state.build, "record": self._project.command(record)}
+        about |= {"id": ids.get(base.name, ""), "build": state.build, "record": self._project.command(record)}
         self._studio.publish("wearing", about, wearer=wearer, why="")
 
     def base(self) -> tuple[Path, Build]:
@@ -121,14 +121,6 @@ class WearerPage:
         self._project.remember(build=output.name)
         self._studio.changed()
         return _result(made)
-
-    def _undo(self, _: Asked) -> None:
-        """Use the build of everybody again."""
-        base = self.base()[0].name
-        if base == self._project.state.build:
-            raise SettingError(f"there is nothing to undo: {base} is that of everybody")
-        self._project.remember(build=base)
-        self._studio.changed()
 
 
 def _added(trials: GraspSet, build: Build) -> list[str]:

@@ -29,12 +29,6 @@ export function points(share) {
   return `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
 }
 
-/** Return the time of a scan of sensors, in words. */
-export function scanTime(us) {
-  if (us === null) return "unknown: they are more than the chips of one bus read";
-  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
-}
-
 /**
  * Show the keys that count now as buttons, the usual one first, with their letters if they have some.
  * @returns {?HTMLButtonElement} the first one, or null if the keys are those of before

@@ -1,5 +1,5 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { interval, percent, points, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
+import { interval, percent, points, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
 import { duration, openPage, WORK } from "./shell.js";
 import { $, box, button, fillTable, list, say, tell } from "./wire.js";
@@ -80,6 +80,12 @@ function listSensors() {
     return box(`${name}, ${kind}${price === null ? "" : `, ${price.toFixed(2)}`}`, () => toggle(sensor));
   });
   $("list").replaceChildren(...boxes);
+}
+
+/** Return the time of a scan of sensors, in words. */
+function scanTime(us) {
+  if (us === null) return "unknown: they are more than the chips of one bus read";
+  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
 }
 
 function show(reply) {

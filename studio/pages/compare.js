@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and the report of one of them.
-import { interval, points, scanTime } from "./choice.js";
+import { interval, points } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -45,22 +45,18 @@ function commands() {
   if ($("build").value) ask("commands", { id: $("build").value, ids: request() });
 }
 
-function show({ builds, hand, both, only, found, said }) {
+function show({ names, hand, kept, found, said }) {
   $("result").hidden = false;
   say($("said"), said);
-  const rows = [
-    ["Recognised of these trials", ({ right, ends: [low, high] }) => interval({ mean: right / found.trials, low, high })],
-    ["Sensors", (build) => build.sensors],
-    ["Scan of switches and pads", (build) => scanTime(build.scan_us)],
-    ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
-    ["Accuracy as compiled", (build) => build.stated],
-    ...(builds[0].price === null ? [] : [["Price", ({ price }) => price.toFixed(2)]]),
-  ];
-  fillTable("both", ["", `a: ${builds[0].name}`, `b: ${builds[1].name}`], rows.map(([title, text]) => [title, ...builds.map(text)]));
-  overlay(hand, { both, a: only[0], b: only[1] }, builds);
+  overlay(hand, kept, names);
   const styles = typeStyles([...found.types.map(({ grasp }) => grasp), ...found.changed.flatMap(({ a, b }) => [a, b])]);
   const types = found.types.map(({ grasp, trials, a, b }) => [tag(styles, grasp), trials, a, b, points((b - a) / trials)]);
-  fillTable("types", ["Type", "Trials", "a right", "b right", "Points"], types);
+  const [a, b] = [found.a, found.b].map((right, at) => {
+    const [low, high] = found.ends[at];
+    return `${right}: ${interval({ mean: right / found.trials, low, high })}`;
+  });
+  const heads = ["Type", "Trials", `a right: ${names[0]}`, `b right: ${names[1]}`, "Points"];
+  fillTable("types", heads, [["all", found.trials, a, b, points(found.difference)], ...types]);
   say($("changed-heading"), `Trials that changed: ${found.changed.length || "none"}; ${found.better} better, ${found.worse} worse with b`);
   fillTable("changed", ["Trial", "True type", "a", "b"], found.changed.map((trial) => {
     const marked = [trial.a, trial.b].map((read) => {
@@ -78,7 +74,7 @@ function linked({ trial, subject, object, recorded }) {
 }
 
 /** Draw one hand on which letters say which build reads a sensor, and list all sensors by their builds. */
-function overlay(hand, kept, builds) {
+function overlay(hand, kept, [a, b]) {
   const kinds = new Map(Object.entries(kept).flatMap(([kind, names]) => names.map((name) => [name, kind])));
   $("hand").toggleAttribute("hidden", !hand.switches.length);
   drawHand($("hand"), { ...hand, switches: hand.switches.map(({ bit, ...one }) => (kinds.has(one.name) ? { ...one, bit } : one)) });
@@ -87,7 +83,7 @@ function overlay(hand, kept, builds) {
     if (kind) spot.append(draw("text", { class: `sign ${kind} middle` }, SIGNS[kind]));
   }
   $("hand").setAttribute("aria-label", "The hand with the sensors of both builds, which the list names");
-  const titles = { both: "both", a: `only a (${builds[0].name})`, b: `only b (${builds[1].name})` };
+  const titles = { both: "both", a: `only a (${a})`, b: `only b (${b})` };
   list($("legend"), Object.entries(kept).map(([kind, names]) => {
     return `${titles[kind]}: ${names.length ? `${names.length}, ${names.join(", ")}` : "none"}`;
   }));

@@ -36,9 +36,10 @@ const ask = openPage({
   },
 });
 
-function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt = "", glove, record }) {
+function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt = "", glove, record, id }) {
   say($("use"), build === base ? `${build}: that of everybody` : `${build}: adapted from ${base}`);
   tell("undo", build !== base && `Undo: use ${base} again`);
+  $("undo").onclick = () => ask("use-build", { id });
   say($("plan"), glove ? `Two trials of each of ${types.length} types; three if you add one.` : "The project has no glove.toml: connect a glove first.");
   for (const one of $("record").elements) one.disabled = !glove;
   say($("record-command"), record);
@@ -59,4 +60,3 @@ onSubmit("record", () => {
 $("adapt").addEventListener("click", () => {
   awaited = ask("adapt");
 });
-$("undo").addEventListener("click", () => ask("unwear"));

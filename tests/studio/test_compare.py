@@ -94,12 +94,11 @@ def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(
     )
     assert said is not None
     assert (said[1], said[2]) == (names[int(gained > 0)], f"{abs(gained):.1f}")
-    both = {row[0]: row[1:] for row in rows(browser, "both")}
-    assert [text.split(" ")[0] for text in both["Recognised of these trials"]] == [
-        f"{100 * one.mean():.1f}" for one in hits
-    ]
-    assert all("[" in text for text in both["Recognised of these trials"])
-    types = rows(browser, "types")
+    whole, *types = rows(browser, "types")
+    assert whole[:2] == ["all", "36"]
+    for text, one in zip(whole[2:4], hits, strict=True):
+        assert text.startswith(f"{one.sum()}: {100 * one.mean():.1f} % [")
+    assert whole[4] == f"{gained:+.1f}".replace("-", "−")
     assert [[int(number) for number in row[1:4]] for row in types] == [
         [int((others.grasps == name).sum()), *(int(one[others.grasps == name].sum()) for one in hits)]
         for name in ("cup", "pen", "rod")

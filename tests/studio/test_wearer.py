@@ -182,7 +182,7 @@ def test_axe_finds_nothing(browser: Browser, studio: Start, folder: Path, width:
         ({"do": "wearer", "name": "ä" * 130}, "is not possible"),
         ({"do": "wearer", "name": "a\nb"}, "control character"),
         ({"do": "wear"}, "the project has no glove.toml"),
-        ({"do": "unwear"}, "nothing to undo"),
+        ({"do": "use-build", "id": "more"}, "the project has no build"),
     ],
 )
 def test_what_a_page_may_not_ask_for_is_refused(
