@@ -188,10 +188,12 @@ class Project:
         files = {"--layout": self.folder / "layout.toml", "--prices": self.folder / "prices.toml"}
         return [word for option, path in files.items() if path.exists() for word in (option, str(path))]
 
-    def build(self) -> tuple[Path, Build] | None:
-        """Return the folder of the build in use, and the build; None without one. Raises BuildError."""
+    def build(self) -> tuple[Path, Build]:
+        """Return the folder of the build in use, and the build. Raises SettingError without one, BuildError."""
         path = self.folder / self.state.build
-        return (path, Build.load(path)) if self.state.build and (path / "build.json").exists() else None
+        if not (self.state.build and (path / "build.json").exists()):
+            raise SettingError("the project has no build in use: train one on the page Choose, or choose one")
+        return path, Build.load(path)
 
     def build_of(self, checksum: str) -> tuple[Path, Build] | None:
         """Return the folder of the build with a checksum, and the build; None without one. Raises BuildError."""

@@ -63,10 +63,7 @@ class WearerPage:
 
     def base(self) -> tuple[Path, Build]:
         """Return the build of everybody: the one in use, or that which was adapted to become it. Raises ThenarError."""
-        found = self._project.build()
-        if found is None:
-            raise SettingError("the project has no build in use: train one on the page Choose")
-        path, build = found
+        path, build = self._project.build()
         if build.manifest.adapted is None:
             return path, build
         base = self._project.build_of(build.manifest.adapted.build)

@@ -1,7 +1,7 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
 import { interval, percent, points, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
-import { duration, openPage, WORK } from "./shell.js";
+import { openPage } from "./shell.js";
 import { $, box, button, fillTable, list, say, tell } from "./wire.js";
 
 let set = null; // the message on the set
@@ -13,7 +13,7 @@ let front = []; // the points of the curve, and their spots
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
-  project: ({ sets, state: { aside, took } }) => {
+  project: ({ sets, state: { aside } }) => {
     const ids = String(sets.map(({ id }) => id));
     // Boxes that stay keep the focus.
     if (ids !== $("sets").dataset.ids) {
@@ -22,8 +22,6 @@ const ask = openPage({
       $("sets").dataset.ids = ids;
     }
     sets.forEach(({ name }, at) => ($("sets").children[at].control.checked = !aside.includes(name)));
-    const known = ["measure", "curve", "train"].filter((what) => took[what] !== undefined);
-    say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");
   },
   set: (message) => {
     // What was measured of earlier recordings is not shown for these.

@@ -2,6 +2,7 @@
 import { draw, drawHand } from "./hand.js";
 import { onSubmit, showKeys } from "./choice.js";
 import { openPage } from "./shell.js";
+import { showDevices } from "./view.js";
 import { $, button, clock, fillTable, list, make, say } from "./wire.js";
 
 const PAST_S = 30, ASK_MS = 500, OLD_MS = 1000;
@@ -102,15 +103,7 @@ function showState(message) {
   say($("problem"), problem?.words ?? "No problem: every sensor works.");
   $("problem").disabled = !problem;
   say($("rates"), Object.entries(message.rates).map(([what, rate]) => `${what}: ${rate.toFixed(1)} readings a second`).join("; "));
-  const rows = message.devices.map(({ name, connected, error, counts: counted }) => [
-    name,
-    connected ? error || "connected" : `lost: ${error}`,
-    counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
-  ]);
-  // Equal rows stay, so that one can select and copy what is said of a lost device.
-  if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
-  $("devices-table").dataset.rows = JSON.stringify(rows);
-  fillTable("devices", ["Device", "State", "Counted"], rows);
+  showDevices(message.devices);
 }
 
 /** Grey what was seen before: nothing watches now. */

@@ -191,7 +191,9 @@ def test_what_a_run_lacks_is_said_in_a_sentence(browser: Browser, studio: Start,
     (project / "studio.json").write_text('{"build": "gone"}')
     opened = studio()
     open_live(browser, opened)
-    browser.wait(lambda: browser.text("doing") == "the project has no build in use: train one, or choose one")
+    browser.wait(
+        lambda: browser.text("doing") == "the project has no build in use: train one on the page Choose, or choose one"
+    )
     assert browser.script("return document.getElementById('steer-run').disabled")
     glove = (project / "glove.toml").read_text()
     (project / "glove.toml").unlink()
