@@ -1,4 +1,4 @@
-// The page Compare: two builds of the project on the same trials, and the report of one of them.
+// The page Compare: two builds of the project on the same trials, and the report of b.
 import { interval, points } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
@@ -13,7 +13,7 @@ const ask = openPage({
   project: ({ builds, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
-    for (const id of ["b", "build"]) fillMenu($(id), builds, current);
+    fillMenu($("b"), builds, current);
     $("no-build").hidden = builds.length > 0;
     $("compare").disabled = $("report").disabled = !builds.length;
     commands();
@@ -42,7 +42,7 @@ const request = () => [$("a").value, $("b").value];
 
 /** Ask for the commands that do what the buttons do. */
 function commands() {
-  if ($("build").value) ask("commands", { id: $("build").value, ids: request() });
+  if ($("b").value) ask("commands", { id: $("b").value, ids: request() });
 }
 
 function show({ names, hand, kept, found, said }) {
@@ -96,9 +96,8 @@ function changed() {
 }
 
 for (const id of ["a", "b"]) $(id).addEventListener("change", changed);
-$("build").addEventListener("change", commands);
 $("compare").addEventListener("click", () => {
   $("result").hidden = true;
   ask("compare", { ids: request() });
 });
-$("report").addEventListener("click", () => ask("report", { id: $("build").value }));
+$("report").addEventListener("click", () => ask("report", { id: $("b").value }));

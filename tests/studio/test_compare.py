@@ -46,7 +46,7 @@ def page(opened: Studio) -> str:
 def begun(browser: Browser, opened: Studio, **how: Any) -> None:
     """Open the page, and wait until it knows the project."""
     browser.open(page(opened), **how)
-    browser.wait(lambda: browser.texts("#build option") and browser.text("on"))
+    browser.wait(lambda: browser.texts("#b option") and browser.text("on"))
 
 
 def compared(browser: Browser, opened: Studio, **how: Any) -> None:
@@ -198,7 +198,7 @@ def test_a_report_is_exported_and_saved_by_the_browser(
     begun(browser, project)
     browser.wait(lambda: browser.text("report-command"))
     command = browser.text("report-command")
-    name = Select(browser.driver.find_element(By.ID, "build")).first_selected_option.text
+    name = Select(browser.driver.find_element(By.ID, "b")).first_selected_option.text
     assert command == f"cp {folder}/{name}/report.html {folder}/{name}.html"
     browser.click("report")
     browser.wait(lambda: browser.driver.find_element(By.ID, "download").is_displayed())
@@ -265,7 +265,7 @@ def test_what_a_page_may_not_ask_for_is_refused(
 def test_a_build_without_a_report_gets_one_of_what_it_states(browser: Browser, project: Studio, folder: Path) -> None:
     (folder / "more" / "report.html").unlink()
     begun(browser, project)
-    Select(browser.driver.find_element(By.ID, "build")).select_by_visible_text("more")
+    Select(browser.driver.find_element(By.ID, "b")).select_by_visible_text("more")
     browser.wait(lambda: browser.text("report-command") == "")
     browser.click("report")
     browser.wait(lambda: browser.text("exported"))
