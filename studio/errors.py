@@ -111,10 +111,10 @@ class ErrorsPage:
     def read(self, report: Report) -> None:
         """Forget how builds recognised what was read before. Pages do not wait for the one in use."""
         self._readings = {}
-        for member in self._project.members("build"):
-            if member.name == self._project.state.build:
+        for member, path in self._project.members("build").items():
+            if path.name == self._project.state.build:
                 with suppress(ThenarError, OSError):
-                    self._reading(member.id)
+                    self._reading(member)
 
     def _errors(self, asked: Asked) -> bytes:
         """Return as which type the sensors, or the build with an id, recognise every trial."""

@@ -233,7 +233,7 @@ class GlovePage:
         return self._written("taxels", _PADS_FILE, [line.name for line in pads.sensors], names, pads.to_toml())
 
     def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> str:
-        """Write a calibration of sensors, name it in glove.toml, and return what it has of the names, in words."""
+        """Write a calibration of sensors, name it in glove.toml, and return how many of the names it has, in words."""
         if not found:
             raise SettingError("no sensor moved, so nothing can be calibrated")
         harness = self._project.harness

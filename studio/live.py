@@ -50,8 +50,8 @@ class StudioLive:
     def _tell(self) -> None:
         """Publish the commands that do what the page's buttons do, and what is wrong."""
         project = self._project
-        members = [member for kind in ("recording", "build") for member in project.members(kind)]
-        paths = {member.id: quote(str(project.folder / member.name)) for member in members}
+        members = project.members("recording") | project.members("build")
+        paths = {member: quote(str(path)) for member, path in members.items()}
         run = why = ""
         try:
             run = project.command(["run", self._runnable()[0], "--glove", project.harness, "--web"])
@@ -96,7 +96,8 @@ class StudioLive:
 
     def _replay(self, ids: tuple[str, ...], *, anew: bool = False) -> Replay:
         """Return a recording, the first id, with builds, the others, or with the build in use; `anew`: as it is now."""
-        used = [member.id for member in self._project.members("build") if member.name == self._project.state.build]
+        builds, current = self._project.members("build"), self._project.state.build
+        used = [member for member, path in builds.items() if path.name == current]
         key = (*ids, *used) if len(ids) == 1 else ids
         if not 2 <= len(key) <= 3:
             raise ThenarError("choose a recording, and one build or two")

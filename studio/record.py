@@ -87,12 +87,11 @@ class RecordPage:
     def _unfinished(self) -> list[tuple[str, Path, Collection, int, int]]:
         """Return the collections that can be continued: id, path, collection, and trials done, of how many."""
         found = []
-        for member in self._project.members("recording"):
-            path = self._project.folder / member.name
+        for member, path in self._project.members("recording").items():
             state = path.stat()
             about = _begun(path, state.st_size, state.st_mtime_ns)
             if about is not None and about[1] < about[2]:
-                found.append((member.id, path, *about))
+                found.append((member, path, *about))
         return found
 
     @property
@@ -178,7 +177,7 @@ class RecordPage:
             self._studio.changed()
 
     def _write(self, sitting: "Sitting", done: int) -> dict[str, object]:
-        """Write the set of the accepted trials, and return what pages show of it.
+        """Write the set of the accepted trials, and return its size and warnings for pages.
 
         What was recorded for a build has its codes, on whichever page it was continued. Once it is complete, it adapts
         the build, if it is the wearer's.

@@ -199,7 +199,10 @@ class Studio(Closing):
         self.closing.close()
 
     def _show_members(self) -> None:
-        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
+        kinds = {
+            f"{kind}s": [{"id": member, "name": path.name} for member, path in self.project.members(kind).items()]
+            for kind in ("set", "recording", "build")
+        }
         self.publish("project", kinds, state=self.project.state)
 
     def _report(self, what: str, done: int, total: int) -> None:

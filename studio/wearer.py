@@ -56,7 +56,7 @@ class WearerPage:
         record = ["record", "--glove", self._project.harness, "--for", base, "--subject", wearer]
         record += ["-o", self._project.new_path(wearer, ".grasps", ".mcap")]
         shown = [f"{path.name}: {size}" for path, size in sets.items()]
-        ids = {one.name: one.id for one in self._project.members("build")}
+        ids = {path.name: member for member, path in self._project.members("build").items()}
         about |= {"base": base.name, "types": types, "sets": shown, "glove": self._project.harness.exists()}
         about |= {"id": ids.get(base.name, ""), "build": state.build, "record": self._project.command(record)}
         self._studio.publish("wearing", about, wearer=wearer, why="")
@@ -74,9 +74,8 @@ class WearerPage:
     def _sets(self, wearer: str, build: Build, report: Report) -> dict[Path, str]:
         """Return the sets of which all trials are a wearer's, and which have the build's inputs; and their sizes."""
         sets, members = dict[Path, str](), self._project.members("set")
-        for number, member in enumerate(members):
+        for number, path in enumerate(members.values()):
             report(number, len(members))
-            path = self._project.folder / member.name
             with suppress(ThenarError, OSError):
                 grasp_set = GraspSet.load(path)
                 select_inputs(grasp_set, build.manifest)

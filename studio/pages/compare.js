@@ -77,10 +77,9 @@ function linked({ trial, subject, object, recorded }) {
 function overlay(hand, kept, [a, b]) {
   const kinds = new Map(Object.entries(kept).flatMap(([kind, names]) => names.map((name) => [name, kind])));
   $("hand").toggleAttribute("hidden", !hand.switches.length);
-  drawHand($("hand"), { ...hand, switches: hand.switches.map(({ bit, ...one }) => (kinds.has(one.name) ? { ...one, bit } : one)) });
-  for (const spot of $("hand").querySelectorAll(".spot")) {
-    const kind = kinds.get(spot.querySelector("title").textContent);
-    if (kind) spot.append(draw("text", { class: `sign ${kind} middle` }, SIGNS[kind]));
+  const switches = hand.switches.map(({ bit, ...one }) => (kinds.has(one.name) ? { ...one, bit } : one));
+  for (const [name, spot] of drawHand($("hand"), { ...hand, switches }).spots) {
+    spot.append(draw("text", { class: `sign ${kinds.get(name)} middle` }, SIGNS[kinds.get(name)]));
   }
   $("hand").setAttribute("aria-label", "The hand with the sensors of both builds, which the list names");
   const titles = { both: "both", a: `only a (${a})`, b: `only b (${b})` };

@@ -216,13 +216,10 @@ function hand(shown, decisive, words) {
   const svg = draw("svg");
   const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
   const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
-  const { setClosed, setPose } = drawHand(svg, { ...set.hand, ...outline, switches, joints: plain });
+  const { spots, setClosed, setPose } = drawHand(svg, { ...set.hand, ...outline, switches, joints: plain });
   setClosed(shown.map((share) => share > 0.5));
   setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
-  const names = decisive.map((sensor) => set.sensors[sensor].name);
-  for (const spot of svg.querySelectorAll(".spot")) {
-    spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
-  }
+  for (const sensor of decisive) spots.get(set.sensors[sensor].name)?.classList.add("decisive");
   svg.setAttribute("aria-label", `hand: ${words}`);
   return [svg];
 }

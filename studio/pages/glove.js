@@ -50,10 +50,9 @@ function showGlove(message) {
   if (!about.hand) return;
   hand = drawHand($("hand"), about.hand, { onSwitch: (sensor) => choose(sensor) });
   $("hand").hidden = !about.hand.switches.length && !about.hand.taxels.length && !about.hand.joints.length;
-  const drawn = new Map([...$("hand").querySelectorAll("[role=button]")].map((spot) => [spot.getAttribute("aria-label"), spot]));
-  spots = about.names.map((name) => drawn.get(name) ?? null);
+  spots = about.names.map((name) => hand.spots.get(name));
   // A spot says its state, and is no switch to turn on.
-  for (const spot of drawn.values()) spot.removeAttribute("aria-pressed");
+  for (const spot of hand.spots.values()) spot.removeAttribute("aria-pressed");
   buttons = about.names.map((name, sensor) => button(name, () => choose(sensor), { class: "plain" }));
   $("sensors").replaceChildren(...buttons.map((one) => make("li", {}, one)));
   const kinds = Object.keys(KINDS).filter((kind) => about.kinds.includes(kind));

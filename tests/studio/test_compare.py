@@ -70,7 +70,7 @@ def rows(browser: Browser, table: str) -> list[list[str]]:
 
 
 def ids(opened: Studio, kind: str) -> dict[str, str]:
-    return {one.name: one.id for one in opened.project.members(kind)}
+    return {path.name: member for member, path in opened.project.members(kind).items()}
 
 
 def test_two_builds_are_compared_on_trials_that_neither_was_trained_on(

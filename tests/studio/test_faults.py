@@ -142,7 +142,7 @@ def test_links_are_followed_and_names_that_are_no_text_left_out(
     (folder / 'naïve "set".grasps').symlink_to(elsewhere / "all.grasps")
     Path(os.fsdecode(bytes(folder) + b"/\xff.grasps")).write_bytes(b"")
     project = Project(folder, hand)
-    assert [one.name for one in project.members("set")] == ["linked.grasps", 'naïve "set".grasps']
+    assert [path.name for path in project.members("set").values()] == ["linked.grasps", 'naïve "set".grasps']
     assert len(project.recordings([folder / "linked.grasps"])[0]) == len(people)
 
 
@@ -229,7 +229,7 @@ def test_a_recording_that_went_on_is_shown_as_it_is_now(
                 recorder.frame(SwitchFrame(time_us, 1))
                 if time_us % 1_000_000 == 990_000:
                     recorder.label(Label(time_us, "accepted", 1 + time_us // 1_000_000, "cup", "A", "cup"))
-        ids = [one.id for kind in ("recording", "build") for one in opened.project.members(kind)][:2]
+        ids = [one for kind in ("recording", "build") for one in opened.project.members(kind)][:2]
         with page(opened.server.url, "none") as live:
             live.send(json.dumps({"do": "replay", "ids": ids}))
             until(live, lambda told: told["topic"] == "replay")
@@ -305,7 +305,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         assert run([*map(str, command), "--for", str(tmp_path / "other")]) == 2
         assert "begun with a different value of build" in " ".join(capsys.readouterr().err.split())
         (member,) = opened.project.members("recording")
-        live.send(json.dumps({"do": "continue", "id": member.id}))
+        live.send(json.dumps({"do": "continue", "id": member}))
         lead(live, board[1], 4, adapts=True)
         leave(live)
         assert until(live, lambda told: told["topic"] == "adapt")["folder"] == "me"
