@@ -233,17 +233,15 @@ class Sitting:
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
         self._sensors = GloveSensors(self._project)
-        # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
-        # step and the time.
+        # The frames of captured trials; the accepted trials; and of the last view the guide's step and the time.
         self._captured = {} if journal is None else dict(journal.captured)
-        self._accepted: Sequence[int] | None = None
+        self._accepted = () if journal is None else journal.accepted
         self._shown, self._telling = (-1, 0), Lock()
 
     def lead(self, stop: Event) -> int:
         """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
         self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
-        # Those of the collection before are no longer shown.
-        self._studio.publish("trials", set="", trials=(), types=(), accuracy=None, command=self._command)
+        self.tell()
         return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
 
     def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
@@ -252,7 +250,7 @@ class Sitting:
         if step != guide.step:
             if guide.stage == "review" and guide.trial is not None:
                 self._captured[guide.trial.number] = guide.captured
-            if guide.accepted != self._accepted:
+            if step < 0 or guide.accepted != self._accepted:
                 self._accepted = guide.accepted
                 # Edits of trials that were undone are taken back.
                 self._studio.show_edits()
@@ -281,8 +279,6 @@ class Sitting:
     def tell(self) -> None:
         """Show the accepted trials, and the accuracy in them, as they were edited."""
         with self._telling:
-            if self._accepted is None:
-                return
             trials, made = [self.trials[number] for number in self._accepted], dict[int, str]()
             with suppress(ThenarError, OSError):
                 edits = load_edits(self._project.edits)[0]
@@ -337,14 +333,14 @@ class Sitting:
 
         Raises SettingError for another trial or type, and as `change` does.
         """
-        if number not in (self._accepted or ()):
+        if number not in self._accepted:
             raise SettingError(f"trial {number} is not among those that were accepted")
         for grasp in filter(None, (self.trials[number].grasp, new)):
             if grasp not in self._taxonomy.types:
                 raise SettingError(self._taxonomy.unknown(grasp))
         change(self._project.edits, [self._id(self.trials[number])], new)
         # It may have been undone meanwhile.
-        restore(self._project.edits, self.output.name, {*(self._accepted or ())})
+        restore(self._project.edits, self.output.name, {*self._accepted})
         self._studio.changed()
 
 
