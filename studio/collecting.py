@@ -156,7 +156,7 @@ def standing(guide: CollectionGuide) -> str:
 
 
 def meet(sources: Sources, switches: int, stop: Event, ends: str) -> None:
-    """Wait until every device is there and one of that number of switches, a taxel or the joints are read, or `stop` is set.
+    """Wait until every device is there and a switch (of this number), a taxel or the joints are read, or `stop` is set.
 
     Raises DeviceError or SettingError for a missing device, DeviceError if all are silent: a port may open even when
     nothing is connected to its other end. `ends` says what then is not done.
