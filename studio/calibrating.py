@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 from time import monotonic
-from typing import Any, Literal
+from typing import Literal
 
 from msgspec.structs import replace
 
@@ -22,7 +22,7 @@ from thenar.runtime.posing import PoseGuide, PoseKey
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.taxels import TaxelCalibration, TaxelSettings, learnt_lines
 
-from .collecting import WAIT_US
+from .collecting import WAIT_US, meet
 
 Codes = tuple[int | None, ...]
 # What is asked of the hand while taxels are calibrated.
@@ -34,7 +34,7 @@ PRESS_WORDS: dict[PressStage, str] = {
 }
 
 _WAIT_S = 0.05
-_PATIENCE_S = 5.0
+_ENDS = "nothing is calibrated"
 # Nobody presses for an hour during a calibration.
 _MOST_FRAMES = 1_000_000
 
@@ -74,7 +74,7 @@ def lead_poses(
     DeviceError, SettingError
         If the glove is not there, or sends no joints.
     """
-    with _rows(port, baud, note) as (names, old_us, read):
+    with _rows(port, baud, stop, note) as (names, old_us, read):
         guide = PoseGuide(names, round(hold_s * 1e6), old_us)
         while guide.stage != "done" and not stop.is_set():
             raw = read()
@@ -104,6 +104,7 @@ def lead_presses(
     harness = _uncalibrated(glove)
     if not harness.taxel_names:
         raise SettingError(f"{glove.name} names no taxels: add `taxels` to a [[stream]], or add a converter")
+    harness = replace(harness, cyberglove=None, streams=tuple(one for one in harness.streams if one.taxels))
     with Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources:
         codes, rested, names = list[Codes](), list[Codes](), harness.taxel_names
         nothing: Codes = (None,) * len(names)
@@ -119,7 +120,7 @@ def lead_presses(
             newest = (found[-1] if found else nothing for found in (codes, rested))
             return view(stage, names, *newest) or stop.is_set()
 
-        _await(sources, take, "taxels")
+        meet(sources, 0, stop, _ENDS)
         while not ready("untouched"):
             pass
         codes.clear()
@@ -141,19 +142,9 @@ def _uncalibrated(glove: Path) -> Harness:
     return replace(load_harness(glove), taxel_settings=TaxelSettings())
 
 
-def _await(sources: Sources, read: Callable[[], Any], what: str) -> None:
-    """Wait until something is read. Raises DeviceError if no data comes, SettingError for a device that cannot work."""
-    end = monotonic() + _PATIENCE_S
-    while not read():
-        sources.raise_settings()
-        if monotonic() > end:
-            wrong = [f"{device.name}: {device.error}" for device in sources.devices() if device.error]
-            raise DeviceError(f"{wrong[0] if wrong else f'no device sends {what}'}; nothing is calibrated")
-
-
 @contextmanager
 def _rows(
-    port: str, baud: int, note: Callable[[str], None]
+    port: str, baud: int, stop: Event, note: Callable[[str], None]
 ) -> Iterator[tuple[tuple[str, ...], int, Callable[[], bytes | None]]]:
     """Yield the names of the joints of a CyberGlove, or of the stream of a glove.toml.
 
@@ -177,7 +168,7 @@ def _rows(
                     rows = [frame.sensors for frame in arrived if isinstance(frame, GloveFrame)]
                     return next((row for row in reversed(rows) if 0 not in row), None)
 
-                _await(sources, newest, "joints")
+                meet(sources, 0, stop, _ENDS)
                 yield harness.sensor_names, old_after_us(sources.glove_period_us), newest
             return
         port, baud, names = wired.port, wired.baud, wired.joints

@@ -107,6 +107,7 @@ class ChoosePage:
             "hand": drawn(grasp_set, hand),
             "joints": _joints(quick.held),
             "trials": _names(ids),
+            "typical": {kind: shares.tolist() for kind, shares in zip(quick.grasps, quick.typical, strict=True)},
             "numbering": numbering,
             "sensors": [
                 {"name": name, "kind": kind, "price": now.prices.get(name)}

@@ -97,7 +97,7 @@ def collect(
             what = name.replace("_", " ")
             raise SettingError(f"{journal.path} was begun with different {what}: begin another recording")
     with Sources(harness, switches, whole_scan(harness, switches, every_taxel=True)) as sources:
-        _meet(sources, len(switches), stop)
+        meet(sources, len(switches), stop, "nothing is recorded")
         if stop.is_set():
             return len(accepted)
         with Recorder(recording, session, tail=None if journal is None else journal.tail) as recorder:
@@ -155,11 +155,11 @@ def standing(guide: CollectionGuide) -> str:
     return "captured: " + ", ".join(filter(None, (closed, sensors)))
 
 
-def _meet(sources: Sources, switches: int, stop: Event) -> None:
-    """Wait until every device is there and something is read, or `stop` is set.
+def meet(sources: Sources, switches: int, stop: Event, ends: str) -> None:
+    """Wait until every device is there and a switch (of this number), a taxel or the joints are read, or `stop` is set.
 
     Raises DeviceError or SettingError for a missing device, DeviceError if all are silent: a port may open even when
-    nothing is connected to its other end.
+    nothing is connected to its other end. `ends` says what then is not done.
     """
     end = now_us() + _PATIENCE_US
     read = False
@@ -169,10 +169,10 @@ def _meet(sources: Sources, switches: int, stop: Event) -> None:
             return
         sources.raise_settings()
         if now_us() > end and missing and all(device.error != NOT_YET for device in missing):
-            raise DeviceError(f"{of_device(missing[0].name, missing[0].error)}; nothing is recorded")
+            raise DeviceError(f"{of_device(missing[0].name, missing[0].error)}; {ends}")
         if now_us() > end and not missing:
             names = list_names([device.name for device in sources.devices()])
-            raise DeviceError(f"{names}: nothing came in {_PATIENCE_US // 1_000_000} s; nothing is recorded")
+            raise DeviceError(f"{names}: nothing came in {_PATIENCE_US // 1_000_000} s; {ends}")
         taken = sources.take(WAIT_US)
         frame, read = taken.switches, read or taken.glove is not None
         if frame is not None:

@@ -3,6 +3,8 @@
 A page names trials by their numbers; an edit also says which numbering they are of, so that none is for another trial.
 """
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,14 +13,13 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recogniser import predicted_classes
 from thenar.compiler.samples import decided, select_inputs
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.build import Build, load_manifest
+from thenar.runtime.build import Build
 from thenar.runtime.model.terms.bit import Bit
 from thenar.runtime.names import shortened
 from thenar.runtime.web.server import message
 
 from .choose import ChoosePage
 from .edits import change, undo
-from .project import Member
 from .quick import Quick, QuickAccuracy, strongest
 from .sensors import sensors_read
 from .studio import Asked, Handler, Report, Studio
@@ -108,19 +109,12 @@ class ErrorsPage:
         studio.add(requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
 
     def read(self, report: Report) -> None:
-        """Offer the builds that can recognise the recordings."""
-        self._readings, builds, unused = {}, list[Member](), list[str]()
-        for member in self._project.members("build"):
-            try:
-                manifest = load_manifest(self._project.folder / member.name)
-                select_inputs(self._choose.recordings.quick.held, manifest)
-                if member.name == self._project.state.build:
-                    # Here pages do not wait for it, if recordings are long.
-                    self._reading(member.id)
-                builds.append(member)
-            except (ThenarError, OSError) as reason:
-                unused.append(f"build {member.name} is left out: {reason}")
-        self._studio.publish("recognisers", builds=builds, unused=unused)
+        """Forget how builds recognised what was read before. Pages do not wait for the one in use."""
+        self._readings = {}
+        for member, path in self._project.members("build").items():
+            if path.name == self._project.state.build:
+                with suppress(ThenarError, OSError):
+                    self._reading(member)
 
     def _errors(self, asked: Asked) -> bytes:
         """Return as which type the sensors, or the build with an id, recognise every trial."""
@@ -144,11 +138,10 @@ class ErrorsPage:
     def _trials(self, asked: Asked) -> bytes:
         """Return the values of sensors in trials, and which decided where one was misread."""
         quick, shown = self._choose.recordings.quick, list[dict[str, object]]()
-        typical = {kind: [*map(float, shares)] for kind, shares in zip(quick.grasps, quick.typical, strict=True)}
         for trial in asked.trials[:_MOST_SHOWN]:
             decisive = self._reading(asked.id).decisive(trial) if asked.id else quick.decisive(trial, asked.sensors)
             shown.append({"trial": trial, "shown": quick.seen(trial).tolist(), "decisive": decisive})
-        return message("trials", trials=shown, typical=typical, asked=asked.trials)
+        return message("trials", trials=shown, asked=asked.trials)
 
     def _reading(self, build: str) -> BuildReading:
         """Return how a build recognises the recordings. Raises ThenarError if there is no such build, or it cannot."""

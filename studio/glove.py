@@ -3,14 +3,12 @@
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from threading import Event
 from time import monotonic
 from typing import get_args
-
-from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.drivers.transports import line_port_fault
@@ -18,7 +16,6 @@ from thenar.runtime.files import write_atomically
 from thenar.runtime.frames import GloveFrame, now_us
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.sources import Sources
 from thenar.runtime.live.stream_probe import CYBERGLOVE, propose_glove
@@ -26,7 +23,6 @@ from thenar.runtime.names import list_names, of_device, shortened
 from thenar.runtime.posing import PoseGuide, PoseKey
 from thenar.runtime.published import DeviceHealth
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.taxels import TaxelSettings
 from thenar.runtime.web.server import message
 
 from .calibrating import PRESS_WORDS, Codes, PressStage, lead_poses, lead_presses
@@ -185,13 +181,14 @@ class GlovePage:
             raise SettingError("joints or pads of a glove.toml can be calibrated")
         self._studio.station.start("calibrating", partial(self._calibrate, work), get_args(PoseKey))
 
-    def _calibrate(self, work: Callable[[Event], None], stop: Event) -> None:
+    def _calibrate(self, work: Callable[[Event], str], stop: Event) -> None:
+        said = ""
         try:
-            work(stop)
+            said = work(stop)
         finally:
-            self._studio.publish("calibrating", step="")
+            self._studio.publish("calibrating", step="", said=said)
 
-    def _calibrate_joints(self, stop: Event) -> None:
+    def _calibrate_joints(self, stop: Event) -> str:
         def view(guide: PoseGuide) -> list[PoseKey]:
             words = {"accept": "I hold it", "back": "Back to the previous pose"}
             if guide.stage == "doubted":
@@ -210,12 +207,12 @@ class GlovePage:
 
         guide = lead_poses(str(self._project.harness), _BAUD, _HOLD_S, view, stop)
         if guide is None:
-            return
+            return ""
         lines = guide.calibration(self._project.state.wearer)
         device = "cyberglove" if self._project.wiring().cyberglove is not None else "stream"
-        self._written(device, _JOINTS_FILE, [line.name for line in lines.sensors], guide.names, lines.to_toml())
+        return self._written(device, _JOINTS_FILE, [line.name for line in lines.sensors], guide.names, lines.to_toml())
 
-    def _calibrate_pads(self, stop: Event) -> None:
+    def _calibrate_pads(self, stop: Event) -> str:
         words = {"untouched": "Nothing is pressed", "pressing": "All were pressed"}
 
         def view(stage: PressStage, names: tuple[str, ...], counts: Codes, rested: Codes) -> bool:
@@ -230,12 +227,13 @@ class GlovePage:
             return "accept" in self._studio.station.pressed()
 
         found = lead_presses(self._project.harness, _HOLD_S, view, stop, self._project.state.wearer)
-        if found is not None:
-            names, pads = found
-            self._written("taxels", _PADS_FILE, [line.name for line in pads.sensors], names, pads.to_toml())
+        if found is None:
+            return ""
+        names, pads = found
+        return self._written("taxels", _PADS_FILE, [line.name for line in pads.sensors], names, pads.to_toml())
 
-    def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> None:
-        """Write a calibration of sensors, and name it in glove.toml."""
+    def _written(self, table: str, file: str, found: Sequence[str], names: Sequence[str], text: str) -> str:
+        """Write a calibration of sensors, name it in glove.toml, and return how many of the names it has, in words."""
         if not found:
             raise SettingError("no sensor moved, so nothing can be calibrated")
         harness = self._project.harness
@@ -243,9 +241,8 @@ class GlovePage:
         write_atomically(harness, _naming(harness.read_text(encoding="utf-8"), table, file).encode())
         lacking = [name for name in names if name not in found]
         said = f"{file}: {len(found)} of {len(names)} are calibrated"
-        said += f"; {list_names(lacking)} did not move" if lacking else ""
-        self._studio.publish("calibrated", said=said)
         self._studio.changed()
+        return said + (f"; {list_names(lacking)} did not move" if lacking else "")
 
 
 def _state(value: int | None, kind: str, changes: int, others: int) -> str:
@@ -273,28 +270,19 @@ def _problem(sensors: GloveSensors, states: Sequence[str], devices: Sequence[Dev
 
 
 def _naming(text: str, table: str, file: str) -> str:
-    """Return the text of a glove.toml in which a calibration is named: with its comments if that is possible."""
-    harness = parse_harness(text, "glove.toml")
-    line, before = f'calibration = "{file}"', None
-    if table == "taxels":
-        before, wanted = (
-            harness.taxel_settings.calibration,
-            replace(harness, taxel_settings=TaxelSettings(calibration=file)),
-        )
-    elif table == "cyberglove" and isinstance(device := harness.joint_device, GloveWiring):
-        before, wanted = device.calibration, replace(harness, cyberglove=replace(device, calibration=file))
-    else:
-        before = harness.calibration
-        streams = (replace(one, calibration=file) if one.joints else one for one in harness.streams)
-        wanted = replace(harness, streams=tuple(streams))
+    """Return the text of a glove.toml in which a calibration is named: in place of the one before, or in its table."""
+
+    def named(text: str) -> str | None:
+        harness = parse_harness(text, "glove.toml")
+        return harness.taxel_settings.calibration if table == "taxels" else harness.calibration
+
+    line = f'calibration = "{file}"'
     heads = [found.end() for found in re.finditer(rf"^\[+{table}\]+[^\n]*\n", text, re.MULTILINE)]
-    tries = [text.replace(f'"{before}"', f'"{file}"', 1)]
+    tries = [text.replace(f'"{named(text)}"', f'"{file}"', 1)]
     tries += [f"{text[:at]}{line}\n{text[at:]}" for at in heads]
-    tries += [f"{text.rstrip()}\n\n[{table}]\n{line}\n", harness_to_toml(wanted)]
+    tries.append(f"{text.rstrip()}\n\n[{table}]\n{line}\n")
     for one in tries:
-        try:
-            if parse_harness(one, "glove.toml") == wanted:
+        with suppress(ThenarError):
+            if named(one) == file:
                 return one
-        except ThenarError:
-            continue
-    raise SettingError(f"name {file} in glove.toml: {line}")
+    raise SettingError(f"{file} is written: name it in glove.toml, in its table, with {line}")

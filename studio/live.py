@@ -4,10 +4,13 @@ The run is one for all pages. A recording is shown to each page that asks for it
 that were shown last stay read.
 """
 
+from contextlib import suppress
+from pathlib import Path
 from shlex import quote
 from threading import Event
 
 from thenar.drivers.errors import SettingError, ThenarError
+from thenar.runtime.build import Build
 from thenar.runtime.glove import Glove
 from thenar.runtime.web.live import LivePage
 from thenar.runtime.web.replay import Replay
@@ -39,31 +42,31 @@ class StudioLive:
 
     def read(self, _: Report) -> None:
         """Let a run go on with the build in use, and tell the page."""
-        built = self._project.build()
-        if built is not None and self._running not in ("", built[1].manifest.checksum):
-            self._swap.set()
+        with suppress(SettingError):
+            if self._running not in ("", self._project.build()[1].manifest.checksum):
+                self._swap.set()
         self._tell()
 
     def _tell(self) -> None:
         """Publish the commands that do what the page's buttons do, and what is wrong."""
         project = self._project
-        members = [member for kind in ("recording", "build") for member in project.members(kind)]
-        paths = {member.id: quote(str(project.folder / member.name)) for member in members}
-        why, built = self._lacking(), project.build()
-        run = "" if built is None else project.command(["run", built[0], "--glove", project.harness, "--web"])
+        members = project.members("recording") | project.members("build")
+        paths = {member: quote(str(path)) for member, path in members.items()}
+        run = why = ""
+        try:
+            run = project.command(["run", self._runnable()[0], "--glove", project.harness, "--web"])
+        except ThenarError as reason:
+            why = str(reason)
         self._studio.publish("live", paths=paths, run=run, why=why, unread=self._unread)
 
-    def _lacking(self) -> str:
-        """Return in a sentence what a run lacks, or ""."""
-        if self._project.build() is None:
-            return "the project has no build in use: train one, or choose one"
+    def _runnable(self) -> tuple[Path, Build]:
+        """Return the build to run. Raises ThenarError for what a run lacks."""
         if not self._project.harness.exists():
-            return f"{self._project.harness} is missing: it says how the glove is wired"
-        return ""
+            raise SettingError(f"{self._project.harness} is missing: it says how the glove is wired")
+        return self._project.build()
 
     def _run(self, _: Asked) -> None:
-        if why := self._lacking():
-            raise SettingError(why)
+        self._runnable()
         if self._studio.station.doing != "live":
             self._studio.station.start("live", self._work)
 
@@ -73,9 +76,7 @@ class StudioLive:
         try:
             while not stop.is_set():
                 self._swap.clear()
-                if (built := self._project.build()) is None:
-                    raise SettingError(self._lacking())
-                folder, build = built
+                folder, build = self._runnable()
                 self._running = build.manifest.checksum
                 with Glove(build, self._project.harness, stop=stop) as glove:
                     self._unread = glove.system.unread
@@ -95,7 +96,8 @@ class StudioLive:
 
     def _replay(self, ids: tuple[str, ...], *, anew: bool = False) -> Replay:
         """Return a recording, the first id, with builds, the others, or with the build in use; `anew`: as it is now."""
-        used = [member.id for member in self._project.members("build") if member.name == self._project.state.build]
+        builds, current = self._project.members("build"), self._project.state.build
+        used = [member for member, path in builds.items() if path.name == current]
         key = (*ids, *used) if len(ids) == 1 else ids
         if not 2 <= len(key) <= 3:
             raise ThenarError("choose a recording, and one build or two")

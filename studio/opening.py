@@ -3,7 +3,7 @@
 from thenar.drivers.extras import optional
 
 from .choose import ChoosePage
-from .compare import add_compare_page
+from .compare import ComparePage
 from .errors import ErrorsPage
 from .glove import GlovePage
 from .live import StudioLive
@@ -21,8 +21,9 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     studio = Studio(project, address, token=token, jobs=jobs, page=page)
     GlovePage(studio)
     RecordPage(studio, WearerPage(studio))
-    ErrorsPage(studio, ChoosePage(studio))
+    choose = ChoosePage(studio)
+    ErrorsPage(studio, choose)
     StudioLive(studio)
-    add_compare_page(studio)
+    ComparePage(studio, choose)
     studio.changed()
     return studio

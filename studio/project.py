@@ -32,24 +32,16 @@ _LONGEST = 200
 _KINDS = {"set": "*.grasps", "recording": "*.mcap", "build": "*/build.json"}
 
 
-class Member(msgspec.Struct, frozen=True):
-    """A file or folder of a project, which pages name by its id."""
-
-    id: str
-    name: str
-
-
 class State(msgspec.Struct, forbid_unknown_fields=True):
     """What is remembered in studio.json.
 
-    build, former  the names of the build in use, and of the one before it was adapted
-    wearer         the name of the person
-    aside          the names of the sets that are left aside
-    took           the seconds that each kind of work last took
+    build   the name of the build in use
+    wearer  the name of the person
+    aside   the names of the sets that are left aside
+    took    the seconds that each kind of work last took
     """
 
     build: str = ""
-    former: str = ""
     wearer: str = "me"
     aside: tuple[str, ...] = ()
     took: dict[str, float] = {}
@@ -93,30 +85,31 @@ class Project:
             setattr(self.state, name, value)
         write_atomically(self._state, msgspec.json.format(msgspec.json.encode(self.state)))
 
-    def members(self, kind: str) -> list[Member]:
-        """Return the members of a kind, "set", "recording" or "build", by name.
+    def members(self, kind: str) -> dict[str, Path]:
+        """Return the members of a kind, "set", "recording" or "build", in the order of their names, by their ids.
 
-        Links are followed, also out of the folder: its owner made them, and no page can make one.
+        Pages name a member by its id. Links are followed, also out of the folder: its owner made them, and no page can
+        make one.
         """
         found = sorted(path for path in self.folder.glob(_KINDS[kind]) if path.exists())
-        names = [path.parent.name if kind == "build" else path.name for path in found]
+        paths = [path.parent if kind == "build" else path for path in found]
         # A name that is no text cannot be sent to a page.
-        return [
-            Member(sha256(name.encode()).hexdigest()[:12], name)
-            for name in names
-            if name == name.encode(errors="ignore").decode()
-        ]
+        return {
+            sha256(path.name.encode()).hexdigest()[:12]: path
+            for path in paths
+            if path.name == path.name.encode(errors="ignore").decode()
+        }
 
     def path(self, kind: str, member: str) -> Path:
         """Return the path of a member. Raises SettingError if there is none of this id."""
-        for one in self.members(kind):
-            if one.id == member:
-                return self.folder / one.name
-        raise SettingError(f"the project has no {kind} {shortened(repr(member))}: load the page again")
+        found = self.members(kind).get(member)
+        if found is None:
+            raise SettingError(f"the project has no {kind} {shortened(repr(member))}: load the page again")
+        return found
 
     def sets(self) -> list[Path]:
         """Return the sets in use."""
-        return [self.folder / one.name for one in self.members("set") if one.name not in self.state.aside]
+        return [path for path in self.members("set").values() if path.name not in self.state.aside]
 
     def recordings(self, paths: Sequence[Path] = ()) -> tuple[GraspSet, list[TrialId], list[str]]:
         """Return these sets, or all in use, as one; and for each of its rows the trial as it was recorded.
@@ -139,8 +132,8 @@ class Project:
         edits, damaged = load_edits(self.edits)
         # Those of sets that were left aside wait, and so do those of recordings for trials that get into a set later.
         there = {trial for name, one in sets.items() for trial in trials_of(name, one)}
-        waiting = {one.name for one in self.members("set")} - sets.keys()
-        waiting |= {f"{Path(one.name).stem}.grasps" for one in self.members("recording")}
+        waiting = {path.name for path in self.members("set").values()} - sets.keys()
+        waiting |= {f"{path.stem}.grasps" for path in self.members("recording").values()}
         used = [edit for edit in edits if edit.set not in waiting or edit.of in there]
         grasp_set, trials, missing = apply_edits(sets, used)
         return grasp_set, trials, [*unused, *missing, *filter(None, [damaged])]
@@ -189,15 +182,16 @@ class Project:
         files = {"--layout": self.folder / "layout.toml", "--prices": self.folder / "prices.toml"}
         return [word for option, path in files.items() if path.exists() for word in (option, str(path))]
 
-    def build(self) -> tuple[Path, Build] | None:
-        """Return the folder of the build in use, and the build; None without one. Raises BuildError."""
+    def build(self) -> tuple[Path, Build]:
+        """Return the folder of the build in use, and the build. Raises SettingError without one, BuildError."""
         path = self.folder / self.state.build
-        return (path, Build.load(path)) if self.state.build and (path / "build.json").exists() else None
+        if not (self.state.build and (path / "build.json").exists()):
+            raise SettingError("the project has no build in use: train one on the page Choose, or choose one")
+        return path, Build.load(path)
 
     def build_of(self, checksum: str) -> tuple[Path, Build] | None:
         """Return the folder of the build with a checksum, and the build; None without one. Raises BuildError."""
-        for member in self.members("build"):
-            path = self.folder / member.name
+        for path in self.members("build").values():
             # One that is damaged, or half written by another process, is not the one.
             with suppress(ThenarError, OSError):
                 if load_manifest(path).checksum == checksum:

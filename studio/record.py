@@ -24,12 +24,11 @@ from thenar.compiler.recordings.taxonomy import ANY, Taxonomy, collected, tasks_
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.calibration import RAW
 from thenar.runtime.files import write_atomically
-from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
+from thenar.runtime.frames import now_us
 from thenar.runtime.glove import Glove
 from thenar.runtime.published import NONE, DeviceHealth
 from thenar.runtime.recording.guide import KEYS, CollectionGuide, Journal, Key, Trial, planned, read_journal
-from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Collection, Label
+from thenar.runtime.recording.session import Collection
 from thenar.runtime.web.server import message
 
 from .collecting import collect, standing, task
@@ -45,7 +44,6 @@ _OFTEN, _TAUGHT = 2, 3
 _SHOW_US = 100_000
 # From this number of trials of every type on there is an accuracy.
 _LEAST = 2
-Frames = tuple[SwitchFrame | None, GloveFrame | None]
 
 
 class RecordPage:
@@ -75,7 +73,6 @@ class RecordPage:
         self._studio.publish(
             "recordings",
             unfinished=found,
-            taxonomies=["kamakura14", "cutkosky16", "feix33", "own"],
             objects=self._objects is not None,
             glove=self._project.harness.exists(),
         )
@@ -90,12 +87,11 @@ class RecordPage:
     def _unfinished(self) -> list[tuple[str, Path, Collection, int, int]]:
         """Return the collections that can be continued: id, path, collection, and trials done, of how many."""
         found = []
-        for member in self._project.members("recording"):
-            path = self._project.folder / member.name
+        for member, path in self._project.members("recording").items():
             state = path.stat()
             about = _begun(path, state.st_size, state.st_mtime_ns)
             if about is not None and about[1] < about[2]:
-                found.append((member.id, path, *about))
+                found.append((member, path, *about))
         return found
 
     @property
@@ -167,22 +163,21 @@ class RecordPage:
     def _start(
         self, recording: Path, collection: Collection, journal: Journal | None = None, *, command: str = ""
     ) -> None:
-        sitting = Sitting(self._studio, recording, collection, journal)
+        sitting = Sitting(self._studio, recording, collection, journal, command)
         self._studio.station.start("recording", partial(self._lead, sitting), KEYS)
-        self._studio.publish("record-command", command=command)
 
     def _lead(self, sitting: "Sitting", stop: Event) -> None:
         """Lead a collection, and write the set of all its accepted trials when it ends."""
-        self._sitting = sitting
-        self._studio.publish("finished", set="")
+        self._sitting, written = sitting, dict[str, object]()
         try:
             if done := sitting.lead(stop):
-                self._write(sitting, done)
+                written = self._write(sitting, done)
         finally:
+            self._studio.publish("collecting", written, stage="over")
             self._studio.changed()
 
-    def _write(self, sitting: "Sitting", done: int) -> None:
-        """Write the set of the accepted trials.
+    def _write(self, sitting: "Sitting", done: int) -> dict[str, object]:
+        """Write the set of the accepted trials, and return its size and warnings for pages.
 
         What was recorded for a build has its codes, on whichever page it was continued. Once it is complete, it adapts
         the build, if it is the wearer's.
@@ -192,11 +187,11 @@ class RecordPage:
         codings = None if build is None else build[1].manifest.codings
         grasp_set, report = import_recordings([sitting.recording], codings=codings)
         grasp_set.save(sitting.output)
+        if build is not None and done == total:
+            self._studio.queue("adapt", partial(self._wearer.adapt, collection.subject))
         warnings = [finding.message for finding in report.warnings]
         about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
-        self._studio.publish("finished", about, done=done, total=total)
-        if build is not None and done == total and collection.subject == self._project.state.wearer:
-            self._studio.queue("adapt", partial(self._wearer.adapt, [sitting.output]))
+        return about | {"done": done, "total": total}
 
 
 class Sitting:
@@ -213,6 +208,8 @@ class Sitting:
         Its file.
     collection, journal
         As for `collect`.
+    command : str
+        What does the same in a terminal; "" if no command does.
 
     Attributes
     ----------
@@ -227,30 +224,25 @@ class Sitting:
         If there are too many trials, or the glove's files cannot be read.
     """
 
-    def __init__(self, studio: Studio, recording: Path, collection: Collection, journal: Journal | None) -> None:
+    def __init__(
+        self, studio: Studio, recording: Path, collection: Collection, journal: Journal | None, command: str
+    ) -> None:
         self._studio, self._project = studio, studio.project
-        self.recording, self.collection, self._journal = recording, collection, journal
+        self.recording, self.collection, self._journal, self._command = recording, collection, journal, command
         self.output, self._adapts = recording.with_suffix(".grasps"), bool(collection.build)
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
         self._sensors = GloveSensors(self._project)
-        # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
-        # step and the time.
-        self._captured = dict[int, Frames]()
-        self._accepted: Sequence[int] | None = None
+        # The frames of captured trials; the accepted trials; and of the last view the guide's step and the time.
+        self._captured = {} if journal is None else dict(journal.captured)
+        self._accepted = () if journal is None else journal.accepted
         self._shown, self._telling = (-1, 0), Lock()
 
     def lead(self, stop: Event) -> int:
         """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
         self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
-        # Those of the collection before are no longer shown.
-        self._studio.publish("trials", set="", trials=(), types=(), accuracy=None)
-        if self._journal is not None:
-            self._captured = _captured(self.recording)
-        try:
-            return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
-        finally:
-            self._studio.publish("collecting", stage="over")
+        self.tell()
+        return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
 
     def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
         """Show the guide's state ten times a second and at every change; return the keys pressed."""
@@ -258,7 +250,7 @@ class Sitting:
         if step != guide.step:
             if guide.stage == "review" and guide.trial is not None:
                 self._captured[guide.trial.number] = guide.captured
-            if guide.accepted != self._accepted:
+            if step < 0 or guide.accepted != self._accepted:
                 self._accepted = guide.accepted
                 # Edits of trials that were undone are taken back.
                 self._studio.show_edits()
@@ -287,8 +279,6 @@ class Sitting:
     def tell(self) -> None:
         """Show the accepted trials, and the accuracy in them, as they were edited."""
         with self._telling:
-            if self._accepted is None:
-                return
             trials, made = [self.trials[number] for number in self._accepted], dict[int, str]()
             with suppress(ThenarError, OSError):
                 edits = load_edits(self._project.edits)[0]
@@ -298,7 +288,7 @@ class Sitting:
             edited = [(trial, made.get(trial.number, trial.grasp)) for trial in trials]
             accuracy = self._accuracy([one for one in edited if one[1] not in ("", NONE)])
             about = {"set": self.output.name, "trials": shown, "types": types, "accuracy": accuracy}
-            self._studio.publish("trials", about)
+            self._studio.publish("trials", about, command=self._command)
 
     def _id(self, trial: Trial) -> TrialId:
         """Return the name of a trial in the log: that in its set, which `import_recordings` makes as one session."""
@@ -343,14 +333,14 @@ class Sitting:
 
         Raises SettingError for another trial or type, and as `change` does.
         """
-        if number not in (self._accepted or ()):
+        if number not in self._accepted:
             raise SettingError(f"trial {number} is not among those that were accepted")
         for grasp in filter(None, (self.trials[number].grasp, new)):
             if grasp not in self._taxonomy.types:
                 raise SettingError(self._taxonomy.unknown(grasp))
         change(self._project.edits, [self._id(self.trials[number])], new)
         # It may have been undone meanwhile.
-        restore(self._project.edits, self.output.name, {*(self._accepted or ())})
+        restore(self._project.edits, self.output.name, {*self._accepted})
         self._studio.changed()
 
 
@@ -365,21 +355,6 @@ def _begun(path: Path, _size: int, _changed_ns: int) -> tuple[Collection, int, i
         return _collection(journal), len(journal.accepted), len(planned(_collection(journal)))
     except (ThenarError, OSError):
         return None
-
-
-def _captured(recording: Path) -> dict[int, Frames]:
-    """Return the frames that were captured in each trial of a recording, the last time."""
-    switches: SwitchFrame | None = None
-    glove: GloveFrame | None = None
-    found = dict[int, Frames]()
-    for entry in Reader(recording):
-        if isinstance(entry, SwitchFrame):
-            switches = entry
-        elif isinstance(entry, GloveFrame):
-            glove = entry
-        elif isinstance(entry, Label) and entry.event == "captured":
-            found[entry.trial] = switches, glove
-    return found
 
 
 def _collection(journal: Journal) -> Collection:

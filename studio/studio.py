@@ -139,8 +139,8 @@ class Studio(Closing):
         about, state = tuple[Any, ...](), self.project.state
         # What is wrong with a build is said by the pages that read it.
         with suppress(ThenarError, OSError):
-            built = self.project.build()
-            about = () if built is None else (built[0], built[1].manifest)
+            folder, build = self.project.build()
+            about = folder, build.manifest
         self.show_edits()
         shell = shell_message(self.project.name, *about, pages=_TITLES, wearer=state.wearer)
         self.server.publish("shell", shell)
@@ -199,7 +199,10 @@ class Studio(Closing):
         self.closing.close()
 
     def _show_members(self) -> None:
-        kinds = {f"{kind}s": self.project.members(kind) for kind in ("set", "recording", "build")}
+        kinds = {
+            f"{kind}s": [{"id": member, "name": path.name} for member, path in self.project.members(kind).items()]
+            for kind in ("set", "recording", "build")
+        }
         self.publish("project", kinds, state=self.project.state)
 
     def _report(self, what: str, done: int, total: int) -> None:

@@ -5,6 +5,7 @@ They are recorded on the page *Record*.
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from thenar.runtime.build import Build
 from thenar.runtime.names import list_names
 from thenar.runtime.published import NONE
 
-from .studio import Asked, Handler, Job, Report, Studio
+from .studio import Asked, Handler, Report, Studio
 
 
 class WearerPage:
@@ -29,47 +30,40 @@ class WearerPage:
 
     def __init__(self, studio: Studio) -> None:
         self._studio, self._project = studio, studio.project
-        # The wearer's sets for the build, as they were last read; None before.
-        self._sets: list[Path] | None = None
-        requests: dict[str, Handler] = {"wearer": self._name, "adapt": self._job, "unwear": self._undo}
+        requests: dict[str, Handler] = {
+            "wearer": self._name,
+            "adapt": lambda _: partial(self.adapt, self._project.state.wearer),
+        }
         studio.add(requests, self.read)
 
     def read(self, report: Report) -> None:
         """Show the build of everybody, and the trials of the wearer for it."""
-        state, sets = self._project.state, dict[Path, str]()
-        about: dict[str, object] = {"wearer": state.wearer}
+        state, about = self._project.state, dict[str, object]()
+        wearer = state.wearer
         try:
             base, build = self.base()
         except ThenarError as reason:
-            self._sets = []
-            self._studio.publish("wearing", about, why=str(reason), sets=())
+            self._studio.publish("wearing", wearer=wearer, why=str(reason), sets=())
             return
-        members = self._project.members("set")
-        for number, member in enumerate(members):
-            report(number, len(members))
-            path = self._project.folder / member.name
-            if (grasp_set := self._fitting(path, build)) is not None:
-                sets[path] = f"{path.name}: {grasp_set.size}"
-        self._sets = [*sets]
+        sets = self._sets(wearer, build, report)
         if sets:
             # A damaged log of edits hinders neither recording nor undo.
             try:
-                about |= self._trials_shown(self._sets, base, build)
+                about |= self._trials_shown([*sets], base, build)
             except ThenarError as reason:
                 about["notes"] = [str(reason)]
         types = [grasp for grasp in build.grasps if grasp != NONE]
-        record = ["record", "--glove", self._project.harness, "--for", base, "--subject", state.wearer]
-        record += ["-o", self._project.new_path(state.wearer, ".grasps", ".mcap")]
-        about |= {"base": base.name, "types": types, "sets": [*sets.values()], "glove": self._project.harness.exists()}
-        about |= {"build": state.build, "undo": self._former, "record": self._project.command(record)}
-        self._studio.publish("wearing", about, why="")
+        record = ["record", "--glove", self._project.harness, "--for", base, "--subject", wearer]
+        record += ["-o", self._project.new_path(wearer, ".grasps", ".mcap")]
+        shown = [f"{path.name}: {size}" for path, size in sets.items()]
+        ids = {path.name: member for member, path in self._project.members("build").items()}
+        about |= {"base": base.name, "types": types, "sets": shown, "glove": self._project.harness.exists()}
+        about |= {"id": ids.get(base.name, ""), "build": state.build, "record": self._project.command(record)}
+        self._studio.publish("wearing", about, wearer=wearer, why="")
 
     def base(self) -> tuple[Path, Build]:
         """Return the build of everybody: the one in use, or that which was adapted to become it. Raises ThenarError."""
-        found = self._project.build()
-        if found is None:
-            raise SettingError("the project has no build in use: train one on the page Choose")
-        path, build = found
+        path, build = self._project.build()
         if build.manifest.adapted is None:
             return path, build
         base = self._project.build_of(build.manifest.adapted.build)
@@ -77,22 +71,17 @@ class WearerPage:
             raise SettingError(f"{path.name} was adapted, and the project no longer has the build that it was made of")
         return base
 
-    @property
-    def _former(self) -> str:
-        """The name of the build that was in use before it was adapted; "" if that is gone, or none was adapted."""
-        state, found = self._project.state, self._project.build()
-        there = {member.name for member in self._project.members("build")}
-        adapted = found is not None and found[1].manifest.adapted is not None
-        return state.former if adapted and state.former in there else ""
-
-    def _fitting(self, path: Path, build: Build) -> GraspSet | None:
-        """Return a set if all its trials are the wearer's, and it has the build's inputs."""
-        try:
-            grasp_set = GraspSet.load(path)
-            select_inputs(grasp_set, build.manifest)
-        except (ThenarError, OSError):
-            return None
-        return grasp_set if np.all(grasp_set.subjects == self._project.state.wearer) else None
+    def _sets(self, wearer: str, build: Build, report: Report) -> dict[Path, str]:
+        """Return the sets of which all trials are a wearer's, and which have the build's inputs; and their sizes."""
+        sets, members = dict[Path, str](), self._project.members("set")
+        for number, path in enumerate(members.values()):
+            report(number, len(members))
+            with suppress(ThenarError, OSError):
+                grasp_set = GraspSet.load(path)
+                select_inputs(grasp_set, build.manifest)
+                if np.all(grasp_set.subjects == wearer):
+                    sets[path] = str(grasp_set.size)
+        return sets
 
     def _name(self, asked: Asked) -> None:
         check_names("subject", [asked.name])
@@ -115,31 +104,19 @@ class WearerPage:
 
     # The build.
 
-    def _job(self, _: Asked) -> Job:
-        if self._sets is None:
-            raise SettingError("the recordings are not read yet: wait until they are")
-        if not self._sets:
-            raise SettingError(f"no set holds only trials of {self._project.state.wearer}: record some")
-        return partial(self.adapt, self._sets)
-
-    def adapt(self, paths: Sequence[Path], _: Report) -> dict[str, object]:
-        """Adapt the build of everybody to trials, put the result into use, and return its accuracy."""
+    def adapt(self, wearer: str, report: Report) -> dict[str, object]:
+        """Adapt the build of everybody to a wearer's trials, put the result into use, and return its accuracy."""
         base, build = self.base()
-        for path in paths:
-            # The wearer may have been another when this was asked for.
-            if self._fitting(path, build) is None:
-                raise SettingError(f"{path.name} is no recording of {self._project.state.wearer} for this build")
-        trials, output = self._project.recordings(paths)[0], self._project.new_path(self._project.state.wearer)
+        if wearer != self._project.state.wearer:
+            raise SettingError(f"{wearer} no longer wears the glove, so nothing is adapted")
+        paths = [*self._sets(wearer, build, report)]
+        if not paths:
+            raise SettingError(f"no set holds only trials of {wearer}: record some")
+        trials, output = self._project.recordings(paths)[0], self._project.new_path(wearer)
         made = adapt(base, trials, output=output, add_type=_added(trials, build))
-        self._project.remember(build=output.name, former=self._project.state.build)
+        self._project.remember(build=output.name)
         self._studio.changed()
         return _result(made)
-
-    def _undo(self, asked: Asked) -> None:
-        if not self._former:
-            raise SettingError("there is nothing to undo: the build in use was not adapted here")
-        self._project.remember(build=self._former, former="")
-        self._studio.changed()
 
 
 def _added(trials: GraspSet, build: Build) -> list[str]:

@@ -29,15 +29,20 @@ class Trial:
     object: str
 
 
+# The newest frames of both kinds.
+Frames = tuple[SwitchFrame | None, GloveFrame | None]
+
+
 @dataclass(frozen=True, slots=True)
 class Journal:
-    """A collection that was begun: its first session, the accepted trials in the order of acceptance, and the place to
-    continue.
+    """A collection that was begun: its first session, the accepted trials in the order of acceptance, the frames that
+    were captured last in each trial, and the place to continue.
     """
 
     path: Path
     session: Session
     accepted: tuple[int, ...]
+    captured: dict[int, Frames]
     tail: Tail
 
 
@@ -69,9 +74,17 @@ def read_journal(path: Path) -> Journal:
     first = reader.session
     if first.collection is None:
         raise SettingError(f"{path} is a recording without trials: name another output")
-    accepted: dict[int, None] = {}
+    accepted, captured = dict[int, None](), dict[int, Frames]()
+    switches: SwitchFrame | None = None
+    glove: GloveFrame | None = None
     for entry in reader:
-        if isinstance(entry, Label) and entry.event == "accepted":
+        if isinstance(entry, SwitchFrame):
+            switches = entry
+        elif isinstance(entry, GloveFrame):
+            glove = entry
+        elif isinstance(entry, Label) and entry.event == "captured":
+            captured[entry.trial] = switches, glove
+        elif isinstance(entry, Label) and entry.event == "accepted":
             accepted[entry.trial] = None
         elif isinstance(entry, Label) and entry.event == "undone":
             accepted.pop(entry.trial, None)
@@ -79,7 +92,7 @@ def read_journal(path: Path) -> Journal:
         raise SettingError(
             f"{path} was changed by another program, or is damaged: import it, and collect the rest into another file"
         )
-    return Journal(path, first, tuple(accepted), reader.tail)
+    return Journal(path, first, tuple(accepted), captured, reader.tail)
 
 
 # A frame of this age was not read while the grasp was held.
@@ -154,7 +167,7 @@ class CollectionGuide:
         self._zero_us = 0
         self._switches: SwitchFrame | None = None
         self._glove: GloveFrame | None = None
-        self._captured: tuple[SwitchFrame | None, GloveFrame | None] = (None, None)
+        self._captured: Frames = (None, None)
         self._whole_us: int | None = None
         self.stage: Stage = "ready" if self._left else "done"
 
@@ -184,7 +197,7 @@ class CollectionGuide:
         return self._left[-1] if self._left else None
 
     @property
-    def captured(self) -> tuple[SwitchFrame | None, GloveFrame | None]:
+    def captured(self) -> Frames:
         """The newest frames; in review, those that were captured."""
         return self._captured if self.stage == "review" else (self._switches, self._glove)
 

@@ -1,26 +1,27 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { interval, listBoxes, percent, points, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
+import { interval, percent, points, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
-import { duration, openPage, WORK } from "./shell.js";
-import { $, box, button, fillTable, list, make, say, tell } from "./wire.js";
-
-const KINDS = { switch: "Switches", pad: "Pads", joint: "Joints" };
+import { openPage } from "./shell.js";
+import { $, box, button, fillTable, list, say, tell } from "./wire.js";
 
 let set = null; // the message on the set
 let hand = null;
 let boxes = [];
 let chosen = []; // numbers of sensors, in the order in which they were chosen
 let shown = null; // the last reply
+let front = []; // the points of the curve, and their spots
 const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
-  project: ({ sets, state: { aside, took } }) => {
-    listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name })), ({ target }) => {
-      ask("use", { id: target.value, value: Number(target.checked) });
-    });
+  project: ({ sets, state: { aside } }) => {
+    const ids = String(sets.map(({ id }) => id));
+    // Boxes that stay keep the focus.
+    if (ids !== $("sets").dataset.ids) {
+      const use = ({ target }) => ask("use", { id: target.value, value: Number(target.checked) });
+      $("sets").replaceChildren(...sets.map(({ id, name }) => box(name, use, { value: id })));
+      $("sets").dataset.ids = ids;
+    }
     sets.forEach(({ name }, at) => ($("sets").children[at].control.checked = !aside.includes(name)));
-    const known = ["measure", "curve", "train"].filter((what) => took[what] !== undefined);
-    say($("times"), known.length ? `Last time, ${known.map((what) => `${WORK[what]} took ${duration(took[what])}`).join(", ")}.` : "");
   },
   set: (message) => {
     // What was measured of earlier recordings is not shown for these.
@@ -68,22 +69,21 @@ function choose(sensors) {
 function mark() {
   const bits = set.sensors.map((_, sensor) => chosen.includes(sensor));
   hand.setClosed(bits);
-  boxes.forEach((box, sensor) => (box.checked = bits[sensor]));
+  boxes.forEach(({ control }, sensor) => (control.checked = bits[sensor]));
+  for (const { sensors, spot } of front) spot.setAttribute("aria-pressed", key(sensors) === key(chosen));
 }
 
 function listSensors() {
-  boxes = [];
-  const groups = Object.entries(KINDS).map(([kind, title]) => {
-    const inside = make("div");
-    set.sensors.forEach(({ name, kind: own, price }, sensor) => {
-      if (own !== kind) return;
-      const label = box(price === null ? name : `${name}, ${price.toFixed(2)}`, () => toggle(sensor));
-      inside.append(label);
-      boxes[sensor] = label.control;
-    });
-    return inside.children.length ? make("fieldset", {}, make("legend", {}, title), inside) : null;
+  boxes = set.sensors.map(({ name, kind, price }, sensor) => {
+    return box(`${name}, ${kind}${price === null ? "" : `, ${price.toFixed(2)}`}`, () => toggle(sensor));
   });
-  $("list").replaceChildren(...groups.filter(Boolean));
+  $("list").replaceChildren(...boxes);
+}
+
+/** Return the time of a scan of sensors, in words. */
+function scanTime(us) {
+  if (us === null) return "unknown: they are more than the chips of one bus read";
+  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
 }
 
 function show(reply) {
@@ -111,33 +111,29 @@ function certify() {
 
 /* ---- The curve: what sensors are worth, as a table and as a front of points to click on ---- */
 
-/** Return the worth of the last sensor of a point, in words. */
-const worth = ({ worth: gain }) => gain && `${points(gain.mean)} [${percent(gain.low)}, ${percent(gain.high)}]`;
-
-/** Choose the sensors with these names. */
-const chooseNamed = (names) => choose(names.map((name) => set.sensors.findIndex((one) => one.name === name)));
-
-function drawCurve({ points: found, of, enough }) {
+function drawCurve({ points: named, of, enough }) {
   $("curve-panel").hidden = false;
+  const number = new Map(set.sensors.map(({ name }, sensor) => [name, sensor]));
+  const found = named.map((point) => ({ ...point, sensors: point.sensors.map((name) => number.get(name)) }));
   const titles = ["Sensors", `${of}, %`, "Worth of the last, points", "After 2 own trials, %", ""];
   fillTable("points", titles, found.map((point) => {
-    const { number, mean, low, high, adapted } = point;
+    const { number, mean, low, high, adapted, worth } = point;
     return [
       number === enough ? `${number}: more matter little` : number,
       `${percent(mean)} [${percent(low)}, ${percent(high)}]`,
-      worth(point) ?? "–",
+      worth ? `${points(worth.mean)} [${percent(worth.low)}, ${percent(worth.high)}]` : "–",
       adapted === null ? "–" : percent(adapted),
-      button(`Choose these ${number}`, () => chooseNamed(point.sensors)),
+      button(`Choose these ${number}`, () => choose(point.sensors)),
     ];
   }));
   $("points").children[found.findIndex(({ number }) => number === enough)]?.setAttribute("aria-current", "true");
-  drawFront(found, of);
-  detail(found.find(({ number }) => number === enough), of);
+  drawFront(found);
+  mark();
 }
 
 const BOX = { left: 52, right: 470, top: 10, bottom: 262 };
 
-function drawFront(found, of) {
+function drawFront(found) {
   const svg = $("front"), most = Math.max(...found.map(({ number }) => number));
   const x = (number) => BOX.left + (number / (most + 0.5)) * (BOX.right - BOX.left);
   const y = (share) => BOX.bottom - share * (BOX.bottom - BOX.top);
@@ -152,8 +148,8 @@ function drawFront(found, of) {
   const line = found.map(({ number, mean }) => `${x(number)} ${y(mean)}`).join("L");
   parts.push(draw("path", { class: "front", d: `M${line}` }));
   svg.replaceChildren(...parts);
-  for (const point of found) {
-    const { number } = point;
+  front = found.map((point) => {
+    const { number, sensors } = point;
     const spot = draw(
       "g",
       { class: "point" },
@@ -161,21 +157,9 @@ function drawFront(found, of) {
       draw("circle", { class: "open", cx: x(number), cy: y(point.mean), r: 5 }),
       draw("rect", { class: "area", x: x(number) - 12, y: BOX.top, width: 24, height: BOX.bottom - BOX.top }),
     );
-    svg.append(pressable(spot, `${number} sensors: ${interval(point)}`, () => detail(point, of)));
-  }
-}
-
-/** Show what a point of the front is. */
-function detail(point, of) {
-  const { number } = point;
-  for (const spot of $("front").querySelectorAll(".point")) {
-    spot.setAttribute("aria-pressed", spot.getAttribute("aria-label").startsWith(`${number} sensors`));
-  }
-  say($("point-heading"), `${number} ${number === 1 ? "sensor" : "sensors"}: ${interval(point)}, ${of}`);
-  tell("point-about", point.worth && `the last one is worth ${worth(point)} points`);
-  say($("point-sensors"), point.sensors.join(", "));
-  say($("point-choose"), number === 1 ? "Choose this sensor" : `Choose these ${number} sensors`);
-  $("point-choose").onclick = () => chooseNamed(point.sensors);
+    svg.append(pressable(spot, `Choose these ${number}: ${interval(point)}`, () => choose(sensors)));
+    return { sensors, spot };
+  });
 }
 
 for (const what of ["measure", "train"]) $(what).addEventListener("click", () => ask(what, { sensors: chosen }));

@@ -1,5 +1,5 @@
-// The page Compare: two builds of the project on the same trials, and what one of them is exported as.
-import { interval, listBoxes, points, scanTime } from "./choice.js";
+// The page Compare: two builds of the project on the same trials, and the report of b.
+import { interval, points } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -7,62 +7,56 @@ import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 
 const SIGNS = { both: "ab", a: "a", b: "b" };
 
+let numbering; // of the recordings in use
+
 const ask = openPage({
-  project: ({ builds, sets, state }) => {
+  project: ({ builds, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
-    for (const id of ["b", "build"]) fillMenu($(id), builds, current);
+    fillMenu($("b"), builds, current);
     $("no-build").hidden = builds.length > 0;
-    // They are compared on all sets unless some are unticked.
-    listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name, checked: !state.aside.includes(name) })), changed);
-    $("compare").disabled = $("report").disabled = $("firmware").disabled = !builds.length;
+    $("compare").disabled = $("report").disabled = !builds.length;
     commands();
   },
-  targets: ({ targets }) => {
-    fillMenu($("target"), targets.map(([id, help]) => ({ id, name: `${id}: ${help}` })), targets[0][0]);
-    commands();
+  set: (set) => {
+    say($("on"), set.why || `On the recordings in use: ${set.name}.`);
+    if (numbering !== set.numbering) changed();
+    numbering = set.numbering;
   },
-  commands: (commands) => {
-    for (const what of ["compare", "report", "firmware"]) say($(`${what}-command`), commands[what]);
-    $("compare").disabled = !commands.compare;
+  commands: ({ report, compare }) => {
+    say($("report-command"), report);
+    say($("compare-command"), compare);
+    $("compare").disabled = !compare;
   },
   compare: (compared) => {
-    if (String(compared.ids) === String(request())) show(compared);
+    if (String(compared.ids) === String(request()) && compared.numbering === numbering) show(compared);
   },
-  report: (made) => exported(made),
-  firmware: (made) => exported(made),
+  report: ({ said, address, name }) => {
+    say($("exported"), said);
+    $("download").replaceChildren(make("a", { href: address, download: name }, `Save ${name}`));
+    commands();
+  },
 });
 
-const request = () => [$("a"), $("b"), ...$("sets").querySelectorAll(":checked")].map(({ value }) => value);
+const request = () => [$("a").value, $("b").value];
 
 /** Ask for the commands that do what the buttons do. */
 function commands() {
-  if ($("build").value && $("target").value) ask("commands", { id: $("build").value, name: $("target").value, ids: request() });
+  if ($("b").value) ask("commands", { id: $("b").value, ids: request() });
 }
 
-function exported({ said, address, name }) {
-  say($("exported"), said);
-  $("download").replaceChildren(make("a", { href: address, download: name }, `Save ${name}`));
-  commands();
-}
-
-function show({ builds, hand, both, only, found, said, unused }) {
+function show({ names, hand, kept, found, said }) {
   $("result").hidden = false;
   say($("said"), said);
-  list($("unused"), unused);
-  const rows = [
-    ["Recognised of these trials", ({ right, ends: [low, high] }) => interval({ mean: right / found.trials, low, high })],
-    ["Sensors", (build) => build.sensors],
-    ["Scan of switches and pads", (build) => scanTime(build.scan_us)],
-    ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
-    ["Accuracy as compiled", (build) => build.stated],
-    ...(builds[0].price === null ? [] : [["Price", ({ price }) => price.toFixed(2)]]),
-  ];
-  fillTable("both", ["", `a: ${builds[0].name}`, `b: ${builds[1].name}`], rows.map(([title, text]) => [title, ...builds.map(text)]));
-  overlay(hand, { both, a: only[0], b: only[1] }, builds);
+  overlay(hand, kept, names);
   const styles = typeStyles([...found.types.map(({ grasp }) => grasp), ...found.changed.flatMap(({ a, b }) => [a, b])]);
   const types = found.types.map(({ grasp, trials, a, b }) => [tag(styles, grasp), trials, a, b, points((b - a) / trials)]);
-  fillTable("types", ["Type", "Trials", "a right", "b right", "Points"], types);
+  const [a, b] = [found.a, found.b].map((right, at) => {
+    const [low, high] = found.ends[at];
+    return `${right}: ${interval({ mean: right / found.trials, low, high })}`;
+  });
+  const heads = ["Type", "Trials", `a right: ${names[0]}`, `b right: ${names[1]}`, "Points"];
+  fillTable("types", heads, [["all", found.trials, a, b, points(found.difference)], ...types]);
   say($("changed-heading"), `Trials that changed: ${found.changed.length || "none"}; ${found.better} better, ${found.worse} worse with b`);
   fillTable("changed", ["Trial", "True type", "a", "b"], found.changed.map((trial) => {
     const marked = [trial.a, trial.b].map((read) => {
@@ -80,16 +74,15 @@ function linked({ trial, subject, object, recorded }) {
 }
 
 /** Draw one hand on which letters say which build reads a sensor, and list all sensors by their builds. */
-function overlay(hand, kept, builds) {
+function overlay(hand, kept, [a, b]) {
   const kinds = new Map(Object.entries(kept).flatMap(([kind, names]) => names.map((name) => [name, kind])));
   $("hand").toggleAttribute("hidden", !hand.switches.length);
-  drawHand($("hand"), { ...hand, switches: hand.switches.map(({ bit, ...one }) => (kinds.has(one.name) ? { ...one, bit } : one)) });
-  for (const spot of $("hand").querySelectorAll(".spot")) {
-    const kind = kinds.get(spot.querySelector("title").textContent);
-    if (kind) spot.append(draw("text", { class: `sign ${kind} middle` }, SIGNS[kind]));
+  const switches = hand.switches.map(({ bit, ...one }) => (kinds.has(one.name) ? { ...one, bit } : one));
+  for (const [name, spot] of drawHand($("hand"), { ...hand, switches }).spots) {
+    spot.append(draw("text", { class: `sign ${kinds.get(name)} middle` }, SIGNS[kinds.get(name)]));
   }
   $("hand").setAttribute("aria-label", "The hand with the sensors of both builds, which the list names");
-  const titles = { both: "both", a: `only a (${builds[0].name})`, b: `only b (${builds[1].name})` };
+  const titles = { both: "both", a: `only a (${a})`, b: `only b (${b})` };
   list($("legend"), Object.entries(kept).map(([kind, names]) => {
     return `${titles[kind]}: ${names.length ? `${names.length}, ${names.join(", ")}` : "none"}`;
   }));
@@ -106,7 +99,4 @@ $("compare").addEventListener("click", () => {
   $("result").hidden = true;
   ask("compare", { ids: request() });
 });
-for (const name of ["report", "firmware"]) {
-  $(name).addEventListener("click", () => ask(name, { id: $("build").value, name: $("target").value }));
-}
-for (const id of ["build", "target"]) $(id).addEventListener("change", commands);
+$("report").addEventListener("click", () => ask("report", { id: $("b").value }));

@@ -37,12 +37,10 @@ const ask = openPage({
     select([]);
     look();
   },
-  recognisers: ({ builds, unused }) => {
-    const options = [...$("of").options].slice(0, 2).map(({ value, text }) => ({ id: value, name: text }));
+  project: ({ builds }) => {
+    const { value } = $("of"), options = [...$("of").options].slice(0, 2).map((one) => ({ id: one.value, name: one.text }));
     fillMenu($("of"), [...options, ...builds.map(({ id, name }) => ({ id, name: `build ${name}` }))], options[0].id);
-    if (!set || set.why) return;
-    list($("unused"), [...set.unused, ...unused]);
-    look();
+    if (set && !set.why && $("of").value !== value) look();
   },
   edits: ({ words }) => showLastEdit(words),
   work: ({ done, total, what }) => {
@@ -184,8 +182,8 @@ function pairOf(trials) {
   return pairs.size === 1 ? [...new Set([...pairs][0].split(" "))].map(Number) : [];
 }
 
-function showTrials({ trials, typical }) {
-  const first = !$("trials").children.length, cards = trials.map((one) => card(one, typical));
+function showTrials({ trials }) {
+  const { typical } = set, first = !$("trials").children.length, cards = trials.map(card);
   const usual = pairOf(selected).map(type).filter((name) => first && typical[name]).map((name) => {
     const caption = make("figcaption", {}, tag(styles, name), ", typically");
     return make("figure", { class: "boxed" }, caption, ...hand(typical[name], [], `${name}, typically`));
@@ -193,8 +191,8 @@ function showTrials({ trials, typical }) {
   $("trials").append(...(cards.length === 1 ? [...cards, ...usual] : [...usual, ...cards]));
 }
 
-function card({ trial, shown, decisive }, typical) {
-  const [truth, read] = [type(reply.truth[trial]), type(reply.read[trial])], words = set.trials[trial];
+function card({ trial, shown, decisive }) {
+  const { typical } = set, [truth, read] = [type(reply.truth[trial]), type(reply.read[trial])], words = set.trials[trial];
   const inputs = decisive.map((sensor) => {
     const usual = [truth, read].filter((name) => typical[name]).map((name) => `${name} ${percent(typical[name][sensor])}`).join(", ");
     return make("li", {}, `${set.sensors[sensor].name} ${percent(shown[sensor])} (${usual})`);
@@ -218,13 +216,10 @@ function hand(shown, decisive, words) {
   const svg = draw("svg");
   const plain = joints.map((joint) => ({ ...joint, low: Math.min(joint.low, joint.high), high: Math.max(joint.low, joint.high) }));
   const outline = switches.length ? {} : { outline: [], strips: [], creases: [], labels: [] };
-  const { setClosed, setPose } = drawHand(svg, { ...set.hand, ...outline, switches, joints: plain });
+  const { spots, setClosed, setPose } = drawHand(svg, { ...set.hand, ...outline, switches, joints: plain });
   setClosed(shown.map((share) => share > 0.5));
   setPose(set.joints.map(({ joint, low, high }) => low + shown[first + joint] * (high - low)));
-  const names = decisive.map((sensor) => set.sensors[sensor].name);
-  for (const spot of svg.querySelectorAll(".spot")) {
-    spot.classList.toggle("decisive", names.includes(spot.querySelector("title").textContent));
-  }
+  for (const sensor of decisive) spots.get(set.sensors[sensor].name)?.classList.add("decisive");
   svg.setAttribute("aria-label", `hand: ${words}`);
   return [svg];
 }

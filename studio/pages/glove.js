@@ -2,6 +2,7 @@
 import { draw, drawHand } from "./hand.js";
 import { onSubmit, showKeys } from "./choice.js";
 import { openPage } from "./shell.js";
+import { showDevices } from "./view.js";
 import { $, button, clock, fillTable, list, make, say } from "./wire.js";
 
 const PAST_S = 30, ASK_MS = 500, OLD_MS = 1000;
@@ -31,7 +32,6 @@ const ask = openPage({
   "glove-state": (message) => showState(message),
   shown: (message) => plot(message),
   calibrating: (message) => showStep(message),
-  calibrated: ({ said }) => say($("calibrated"), said),
 });
 
 /** A page that is opened while nothing uses the glove begins to watch it. */
@@ -47,15 +47,12 @@ function showGlove(message) {
   $("with-glove").hidden = !about.there;
   if (about.why) say($("refused"), about.why);
   $("ports").replaceChildren(...about.ports.map((port) => new Option(port)));
-  const ports = about.ports.length ? `Ports here: ${about.ports.join(", ")}. ` : "";
-  say($("addresses"), `${ports}Or tcp://HOST:PORT, udp://0.0.0.0:PORT, ble://NAME, the path of a serial port, or cyberglove:PORT for a CyberGlove.`);
   if (!about.hand) return;
   hand = drawHand($("hand"), about.hand, { onSwitch: (sensor) => choose(sensor) });
   $("hand").hidden = !about.hand.switches.length && !about.hand.taxels.length && !about.hand.joints.length;
-  const drawn = new Map([...$("hand").querySelectorAll("[role=button]")].map((spot) => [spot.getAttribute("aria-label"), spot]));
-  spots = about.names.map((name) => drawn.get(name) ?? null);
+  spots = about.names.map((name) => hand.spots.get(name));
   // A spot says its state, and is no switch to turn on.
-  for (const spot of drawn.values()) spot.removeAttribute("aria-pressed");
+  for (const spot of hand.spots.values()) spot.removeAttribute("aria-pressed");
   buttons = about.names.map((name, sensor) => button(name, () => choose(sensor), { class: "plain" }));
   $("sensors").replaceChildren(...buttons.map((one) => make("li", {}, one)));
   const kinds = Object.keys(KINDS).filter((kind) => about.kinds.includes(kind));
@@ -105,15 +102,7 @@ function showState(message) {
   say($("problem"), problem?.words ?? "No problem: every sensor works.");
   $("problem").disabled = !problem;
   say($("rates"), Object.entries(message.rates).map(([what, rate]) => `${what}: ${rate.toFixed(1)} readings a second`).join("; "));
-  const rows = message.devices.map(({ name, connected, error, counts: counted }) => [
-    name,
-    connected ? error || "connected" : `lost: ${error}`,
-    counted.filter(({ value }) => value).map(({ name: what, value }) => `${what} ${value}`).join(", "),
-  ]);
-  // Equal rows stay, so that one can select and copy what is said of a lost device.
-  if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
-  $("devices-table").dataset.rows = JSON.stringify(rows);
-  fillTable("devices", ["Device", "State", "Counted"], rows);
+  showDevices(message.devices);
 }
 
 /** Grey what was seen before: nothing watches now. */
@@ -165,10 +154,11 @@ $("problem").addEventListener("click", () => {
   } else ask("watch");
 });
 
-function showStep({ step, what, problems, faults, keys }) {
+function showStep({ step, what, problems, faults, keys, said = "" }) {
   const open = Boolean(step);
   if (open && $("calibration").hidden) say($("refused"), "");
   $("calibration").hidden = !open;
+  say($("calibrated"), said);
   if (!open) return;
   say($("step"), step);
   say($("what"), what);

@@ -2,7 +2,7 @@
 import { draw } from "./hand.js";
 
 const MARGIN = 14, REACH = 12; // pixels; the margin is its padding
-const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
+const ARROWS = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowDown: ["y", 1], ArrowUp: ["y", -1] };
 
 export class TrialMap {
   #svg;
@@ -64,18 +64,13 @@ export class TrialMap {
     return [MARGIN + x * (clientWidth - 2 * MARGIN), MARGIN + y * (clientHeight - 2 * MARGIN)];
   }
 
-  // The trial of the least cost, which its place and number have; -1 if none is below the limit.
-  #best(cost, limit) {
-    let best = -1;
-    this.#trials.forEach((trial, number) => {
-      const found = cost(this.#pixels(trial), number);
-      if (found < limit) [best, limit] = [number, found];
-    });
-    return best;
-  }
-
   #nearest([x, y]) {
-    return this.#best(([left, top]) => Math.hypot(left - x, top - y), REACH);
+    const away = this.#trials.map((trial) => {
+      const [left, top] = this.#pixels(trial);
+      return Math.hypot(left - x, top - y);
+    });
+    const least = Math.min(...away);
+    return least < REACH ? away.indexOf(least) : -1;
   }
 
   #point(trial) {
@@ -102,25 +97,16 @@ export class TrialMap {
     this.#lasso.setAttribute("points", "");
   }
 
-  /** Go to the nearest trial in the direction of an arrow, and select it by Enter. */
+  /** Go to the next trial along an axis by an arrow, so that each can be reached, and select it by Enter. */
   #press(event) {
     if (event.key === "Enter" || event.key === " ") {
       event.preventDefault();
       if (this.#pointed >= 0) this.#on.select([this.#pointed]);
     }
-    const ahead = ARROWS[event.key];
-    if (!ahead || !this.#trials.length) return;
+    if (!ARROWS[event.key] || !this.#trials.length) return;
     event.preventDefault();
-    if (this.#pointed < 0) {
-      this.#point(0);
-      return;
-    }
-    const from = this.#pixels(this.#trials[this.#pointed]);
-    const best = this.#best((to, number) => {
-      const [right, down] = [to[0] - from[0], to[1] - from[1]], along = right * ahead[0] + down * ahead[1];
-      const aside = Math.abs(right * ahead[1]) + Math.abs(down * ahead[0]);
-      return number !== this.#pointed && along > 0 ? along + 2 * aside : Infinity;
-    }, Infinity);
-    if (best >= 0) this.#point(best);
+    const [axis, step] = ARROWS[event.key];
+    const order = [...this.#trials.keys()].sort((one, other) => this.#trials[one][axis] - this.#trials[other][axis]);
+    this.#point(order[order.indexOf(this.#pointed) + step] ?? order[0]);
   }
 }

@@ -27,13 +27,12 @@ const ask = openPage({
   shell: ({ wearer }) => {
     if (!edited) $("subject").value = wearer;
   },
-  recordings: ({ unfinished, taxonomies, objects, glove }) => {
+  recordings: ({ unfinished, objects, glove }) => {
     $("no-glove").hidden = glove;
     $("start").disabled = !glove;
     say($("objects"), objects ? "Objects are those of objects.toml." : "");
+    if (objects && !listed) $("taxonomy").value = "own";
     listed = objects;
-    const members = taxonomies.map((id) => ({ id, name: id === "own" && objects ? "own, of objects.toml" : id }));
-    fillMenu($("taxonomy"), members, objects ? "own" : taxonomies[0]);
     askTypes();
     $("unfinished").hidden = !unfinished.length;
     $("recordings").replaceChildren(...unfinished.map(({ id, name, subject, done, total }) => {
@@ -43,7 +42,6 @@ const ask = openPage({
   },
   closed: () => say($("standing"), "this page is not connected"),
   collecting: (state) => show(state),
-  "record-command": ({ command }) => say($("record-command"), command),
   trials: (message) => showTrials(message),
   "glove-hand": (message) => {
     drawn = message.hand;
@@ -66,13 +64,6 @@ const ask = openPage({
     edits = new Map(made.map(([type, ...trial]) => [String(trial), type]));
     showLastEdit(words);
     markTrials();
-  },
-  finished: ({ set, size, warnings, done, total }) => {
-    $("end").hidden = !set || stage !== "over";
-    if (!set) return;
-    say($("end-heading"), `Recorded: ${set}`);
-    say($("size"), `${size}; ${done} of ${total} trials are done`);
-    list($("warnings"), warnings.length ? warnings : ["The import has no warning."]);
   },
   set: ({ why, types, taxonomy, sensors: all }) => {
     sensors = all.length;
@@ -105,8 +96,11 @@ function show(state) {
   adapts = state.adapts;
   $("begin").hidden = !over;
   $("leading").hidden = over;
-  if (over) return;
-  $("end").hidden = true;
+  $("end").hidden = !over || !state.set;
+  if (over) {
+    if (state.set) showEnd(state);
+    return;
+  }
   if (before === "over") say($("refused"), "");
   if (stage === "waiting") {
     say($("prompt"), "Waiting for the glove …");
@@ -131,6 +125,13 @@ function show(state) {
   leadBy(keys);
 }
 
+/** Show what was recorded. */
+function showEnd({ set, size, warnings, done, total }) {
+  say($("end-heading"), `Recorded: ${set}`);
+  say($("size"), `${size}; ${done} of ${total} trials are done`);
+  list($("warnings"), warnings.length ? warnings : ["The import has no warning."]);
+}
+
 /** Show the keys that count now; the first is the one that Enter presses, and has the focus. */
 function leadBy(keys) {
   const focused = !document.activeElement || document.activeElement === document.body || $("leading").contains(document.activeElement);
@@ -151,20 +152,19 @@ document.addEventListener("keydown", (event) => {
 
 function showTrials(message) {
   shown = message;
-  const { trials, types, accuracy } = shown, styles = typeStyles(types);
+  const { trials, types, accuracy, command } = shown, styles = typeStyles(types);
+  say($("record-command"), command);
   fillMenu($("type"), types.filter((type) => type !== "none").map((type) => ({ id: type, name: type })));
   $("so-far").hidden = !trials.length;
   if (!trials.some(([trial]) => trial === seen)) $("seen").hidden = true;
   say($("accuracy"), accuracyWords(accuracy));
-  const strip = $("strip"), same = [...strip.children].findIndex((item, at) => item.dataset.trial !== String(trials[at]?.[0]));
-  const keep = same < 0 ? Math.min(strip.children.length, trials.length) : same;
-  while (strip.children.length > keep) strip.lastChild.remove();
-  for (const [trial, grasp, thing] of trials.slice(keep)) {
+  const more = trials.length > $("strip").children.length;
+  $("strip").replaceChildren(...trials.map(([trial, grasp, thing]) => {
     const show = button(`${trial} `, () => ask("recorded", { trial }), { class: "plain", title: thing });
     show.append(tag(styles, grasp), make("span"));
-    strip.append(make("li", { "data-trial": trial }, show));
-    $("strip-scroll").scrollLeft = strip.scrollWidth;
-  }
+    return make("li", {}, show);
+  }));
+  if (more) $("strip-scroll").scrollLeft = $("strip").scrollWidth;
   markTrials();
 }
 

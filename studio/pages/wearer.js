@@ -20,8 +20,6 @@ const ask = openPage({
     say($("result-heading"), `Adapted: ${result.folder}, from ${result.total} trials`);
     say($("before"), result.before);
     say($("after"), result.after);
-    const [type, count, , after] = result.types[0];
-    say($("worst"), `${type}: ${after} of ${count}`);
     list($("warnings"), result.warnings);
     const styles = typeStyles(result.types.map(([name]) => name));
     const rows = result.types.map(([name, ...counts]) => [tag(styles, name), ...counts]);
@@ -38,9 +36,10 @@ const ask = openPage({
   },
 });
 
-function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt = "", glove, record, undo }) {
+function show({ wearer, base, build, types, sets, counts = {}, notes = [], adapt = "", glove, record, id }) {
   say($("use"), build === base ? `${build}: that of everybody` : `${build}: adapted from ${base}`);
-  tell("undo", undo && `Undo: use ${undo} again`);
+  tell("undo", build !== base && `Undo: use ${base} again`);
+  $("undo").onclick = () => ask("use-build", { id });
   say($("plan"), glove ? `Two trials of each of ${types.length} types; three if you add one.` : "The project has no glove.toml: connect a glove first.");
   for (const one of $("record").elements) one.disabled = !glove;
   say($("record-command"), record);
@@ -61,4 +60,3 @@ onSubmit("record", () => {
 $("adapt").addEventListener("click", () => {
   awaited = ask("adapt");
 });
-$("undo").addEventListener("click", () => ask("unwear"));

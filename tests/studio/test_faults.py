@@ -29,7 +29,6 @@ from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.web.server import message
-from thenar.studio.opening import open_studio
 from thenar.studio.project import Project
 from thenar.studio.studio import Station, Studio
 
@@ -52,15 +51,13 @@ def test_a_build_that_is_half_written_hides_nothing_else(
     Project(folder, hand).remember(build="more", wearer="A")
     (folder / "more" / "build.json").write_bytes((folder / "more" / "build.json").read_bytes()[:100])
     (folder / "half.grasps").write_bytes(b"half")
-    with page(studio().server.url, "shell,set,recordings,wearing,recognisers,work") as live:
+    with page(studio().server.url, "shell,set,recordings,wearing,work") as live:
         shown = dict[str, Any]()
-        while not {"shell", "set", "recordings", "wearing", "recognisers"} <= {*shown} or "why" not in shown["work"]:
+        while not {"shell", "set", "recordings", "wearing"} <= {*shown} or "why" not in shown["work"]:
             told = json.loads(live.recv(timeout=PATIENCE_S))
             shown[told["topic"]] = told
     assert shown["shell"]["build"] == ""
     assert "build.json" in shown["wearing"]["why"]
-    assert ["build.json" in said for said in shown["recognisers"]["unused"]] == [True]
-    assert [one["name"] for one in shown["recognisers"]["builds"]] == ["few"]
     assert "build.json" in shown["work"]["why"]
     assert shown["set"]["name"] == "set.grasps"
     assert [said.partition(" is")[0] for said in shown["set"]["unused"]] == ["half.grasps"]
@@ -104,11 +101,6 @@ def test_recordings_that_cannot_be_used_leave_a_wearer_recording_and_undo(studio
     assert "/C.grasps" not in shown["adapt"]
 
 
-def test_a_wearer_whose_recordings_are_not_read_yet_is_asked_to_wait(worn: Path, hand: HandShape) -> None:
-    with open_studio(Project(worn, hand), "127.0.0.1:0", token=None) as opened:
-        assert "not read yet" in refusal(opened, do="adapt")
-
-
 def test_a_folder_that_is_gone_is_said_in_a_sentence(studio: Start, tmp_path: Path) -> None:
     opened = studio()
     shutil.rmtree(tmp_path / "recorded")
@@ -150,7 +142,7 @@ def test_links_are_followed_and_names_that_are_no_text_left_out(
     (folder / 'naïve "set".grasps').symlink_to(elsewhere / "all.grasps")
     Path(os.fsdecode(bytes(folder) + b"/\xff.grasps")).write_bytes(b"")
     project = Project(folder, hand)
-    assert [one.name for one in project.members("set")] == ["linked.grasps", 'naïve "set".grasps']
+    assert [path.name for path in project.members("set").values()] == ["linked.grasps", 'naïve "set".grasps']
     assert len(project.recordings([folder / "linked.grasps"])[0]) == len(people)
 
 
@@ -237,7 +229,7 @@ def test_a_recording_that_went_on_is_shown_as_it_is_now(
                 recorder.frame(SwitchFrame(time_us, 1))
                 if time_us % 1_000_000 == 990_000:
                     recorder.label(Label(time_us, "accepted", 1 + time_us // 1_000_000, "cup", "A", "cup"))
-        ids = [one.id for kind in ("recording", "build") for one in opened.project.members(kind)][:2]
+        ids = [one for kind in ("recording", "build") for one in opened.project.members(kind)][:2]
         with page(opened.server.url, "none") as live:
             live.send(json.dumps({"do": "replay", "ids": ids}))
             until(live, lambda told: told["topic"] == "replay")
@@ -313,7 +305,7 @@ def test_what_was_begun_for_a_wearer_is_continued_on_the_page_record(
         assert run([*map(str, command), "--for", str(tmp_path / "other")]) == 2
         assert "begun with a different value of build" in " ".join(capsys.readouterr().err.split())
         (member,) = opened.project.members("recording")
-        live.send(json.dumps({"do": "continue", "id": member.id}))
+        live.send(json.dumps({"do": "continue", "id": member}))
         lead(live, board[1], 4, adapts=True)
         leave(live)
         assert until(live, lambda told: told["topic"] == "adapt")["folder"] == "me"

@@ -177,7 +177,8 @@ def test_a_run_and_a_recording_are_shown_side_by_side(
     browser.wait(lambda: browser.text("grasp") == recognised(project / "few", people, 0))
     first = browser.driver.current_window_handle
     browser.driver.switch_to.new_window("window")
-    ids = {member.name: member.id for kind in ("recording", "build") for member in opened.project.members(kind)}
+    members = opened.project.members("recording") | opened.project.members("build")
+    ids = {path.name: member for member, path in members.items()}
     open_live(browser, opened, f"?id={ids['rec.mcap']}&id={ids['more']}#t=1.5")
     browser.wait(lambda: browser.text("place").startswith("0:01.50 of 0:06.0"))
     browser.wait(lambda: browser.text("grasp") != "no frame yet")
@@ -191,7 +192,9 @@ def test_what_a_run_lacks_is_said_in_a_sentence(browser: Browser, studio: Start,
     (project / "studio.json").write_text('{"build": "gone"}')
     opened = studio()
     open_live(browser, opened)
-    browser.wait(lambda: browser.text("doing") == "the project has no build in use: train one, or choose one")
+    browser.wait(
+        lambda: browser.text("doing") == "the project has no build in use: train one on the page Choose, or choose one"
+    )
     assert browser.script("return document.getElementById('steer-run').disabled")
     glove = (project / "glove.toml").read_text()
     (project / "glove.toml").unlink()
@@ -236,14 +239,15 @@ def test_without_builds_and_a_run_nothing_empty_is_shown(browser: Browser, studi
     assert browser.axe() == []
     browser.open(f"{server.url}compare.html")
     browser.wait(lambda: browser.driver.find_element(By.ID, "no-build").is_displayed())
-    for name in ("a", "b", "build"):
+    for name in ("a", "b"):
         assert not browser.driver.find_element(By.ID, name).is_displayed(), name
     assert browser.axe() == []
 
 
 def test_a_page_names_members_by_id_alone_and_its_requests_are_bounded(studio: Start, project: Path) -> None:
     opened = studio()
-    ids = {member.name: member.id for kind in ("recording", "build") for member in opened.project.members(kind)}
+    members = opened.project.members("recording") | opened.project.members("build")
+    ids = {path.name: member for member, path in members.items()}
     recording, few, more = ids["rec.mcap"], ids["few"], ids["more"]
     with page(opened.server.url) as live:
 
@@ -273,6 +277,6 @@ def test_a_page_names_members_by_id_alone_and_its_requests_are_bounded(studio: S
         # However many recordings pages ask for, a few stay open.
         for name in range(6):
             (project / f"rec{name}.mcap").write_bytes((project / "rec.mcap").read_bytes())
-        for one in opened.project.members("recording"):
-            assert reply(do="replay", ids=[one.id, few])["name"] == one.name
+        for one, path in opened.project.members("recording").items():
+            assert reply(do="replay", ids=[one, few])["name"] == path.name
     assert json.loads((project / "studio.json").read_text())["build"] == "few"

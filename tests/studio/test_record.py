@@ -61,7 +61,7 @@ def begin(browser: Browser, *, repetitions: int = 2, none: bool = False, subject
     name = browser.driver.find_element(By.ID, "subject")
     name.clear()
     name.send_keys(subject)
-    Select(browser.driver.find_element(By.ID, "taxonomy")).select_by_value("kamakura14")
+    Select(browser.driver.find_element(By.ID, "taxonomy")).select_by_visible_text("kamakura14")
     number = browser.driver.find_element(By.ID, "repetitions")
     number.clear()
     number.send_keys(str(repetitions))

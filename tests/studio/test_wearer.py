@@ -83,7 +83,6 @@ def test_a_build_is_adapted_to_its_wearer_and_back(
         assert by_type[name][:2] == [truth.sum(), (truth & (np.array(read) == name)).sum()]
     assert sum(counts[2] for counts in by_type.values()) == made.after
     worst = rows(browser, "types")[0]
-    assert browser.text("worst") == f"{worst[0]}: {worst[3]} of {worst[1]}"
     assert int(worst[3]) / int(worst[1]) == min(after / count for count, _, after in by_type.values())
     assert browser.script("return document.activeElement.id") == "result-heading"
     ends = browser.text("after").partition(": ")[2].removesuffix(" %")
@@ -96,16 +95,16 @@ def test_a_build_is_adapted_to_its_wearer_and_back(
 
 
 def test_an_adaptation_of_an_adapted_build_is_one_of_everybodys(browser: Browser, studio: Start, folder: Path) -> None:
-    """And undone in steps."""
+    """And that is what is used again after it is undone."""
     begun(browser, studio(None))
     adapted(browser)
     browser.wait(lambda: browser.text("adapt-command").endswith("C-2"))
     browser.click("adapt")
     browser.wait(lambda: browser.text("use") == "C-2: adapted from more")
     assert (folder / "C" / "tables.bin").read_bytes() == (folder / "C-2" / "tables.bin").read_bytes()
-    assert browser.text("undo") == "Undo: use C again"
+    assert browser.text("undo") == "Undo: use more again"
     browser.click("undo")
-    browser.wait(lambda: browser.text("use") == "C: adapted from more")
+    browser.wait(lambda: browser.text("use") == "more: that of everybody")
 
 
 def test_another_wearer_has_other_recordings_and_is_remembered(
@@ -183,7 +182,7 @@ def test_axe_finds_nothing(browser: Browser, studio: Start, folder: Path, width:
         ({"do": "wearer", "name": "ä" * 130}, "is not possible"),
         ({"do": "wearer", "name": "a\nb"}, "control character"),
         ({"do": "wear"}, "the project has no glove.toml"),
-        ({"do": "unwear"}, "nothing to undo"),
+        ({"do": "use-build", "id": "more"}, "the project has no build"),
     ],
 )
 def test_what_a_page_may_not_ask_for_is_refused(
@@ -198,7 +197,7 @@ def test_what_a_page_may_not_ask_for_is_refused(
 def test_another_persons_trials_are_not_adapted_to(studio: Start, folder: Path) -> None:
     """Also if the wearer becomes another one while work that was asked for before goes on."""
     opened, ended = studio(None), Event()
-    with page(opened.server.url, "wearing,shell") as live:
+    with page(opened.server.url, "wearing,shell,work") as live:
         until(live, lambda told: bool(told.get("sets")))
 
         def work(_: Report) -> None:
@@ -212,8 +211,7 @@ def test_another_persons_trials_are_not_adapted_to(studio: Start, folder: Path) 
         told = until(live, lambda told: told["topic"] == "wearing" and told["wearer"] == "E")
         assert told["sets"] == []
         live.send(json.dumps({"do": "adapt"}))
-        refused = until(live, lambda told: told["topic"] == "refused")
-    assert refused["why"] == "no set holds only trials of E: record some"
+        until(live, lambda told: told.get("why") == "no set holds only trials of E: record some")
     assert opened.project.state.build == "more"
     assert not (folder / "C").exists()
 

@@ -104,7 +104,7 @@ def test_from_an_empty_folder_to_an_exported_recogniser(
     go(browser, "Record")
     browser.wait(lambda: browser.texts("#taxonomy option"))
     fill(browser, "subject", "Anna")
-    Select(browser.driver.find_element(By.ID, "taxonomy")).select_by_value("own")
+    Select(browser.driver.find_element(By.ID, "taxonomy")).select_by_visible_text("own")
     fill(browser, "types", "fist, pinch, point")
     fill(browser, "repetitions", "4")
     browser.click("none")
@@ -139,8 +139,8 @@ def test_from_an_empty_folder_to_an_exported_recogniser(
         browser.wait(lambda grasp=grasp: browser.text("grasp") == grasp)  # type: ignore[misc]
 
     go(browser, "Compare")
-    browser.wait(lambda: len(browser.texts("#build option")) == 2)
-    Select(browser.driver.find_element(By.ID, "build")).select_by_visible_text(folder)
+    browser.wait(lambda: len(browser.texts("#b option")) == 2)
+    Select(browser.driver.find_element(By.ID, "b")).select_by_visible_text(folder)
     browser.click("report")
     browser.wait(lambda: browser.driver.find_element(By.ID, "download").is_displayed())
     link = browser.driver.find_element(By.CSS_SELECTOR, "#download a")

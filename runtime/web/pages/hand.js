@@ -281,6 +281,8 @@ function unplaced(joints) {
  * setClosed(bits, lost)  arrays of truth, by the number of the kept switch; `lost` may be left out
  * setTaxels(values)      how far each of hand.taxels is pressed, 0 to 1; null: unknown
  * setPose(values)        the value of each of hand.joints, in its unit; null: lost
+ *
+ * and `spots`, the element of each kept switch and taxel by its name, for marks.
  */
 export function drawHand(svg, hand, { onSwitch = null } = {}) {
   const glove = new Glove(hand, onSwitch);
@@ -317,6 +319,7 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
   new ResizeObserver(arrange).observe(svg);
 
   return {
+    spots: new Map(glove.spots.map(({ name, group: spot }) => [name, spot])),
     setClosed: (bits, lost) => glove.setClosed(bits, lost),
     setTaxels: (values) => glove.setTaxels(values),
     setPose(values) {

@@ -4,10 +4,10 @@ import { $, button, clock, make, say, tell } from "./wire.js";
 
 const FIRST_MS = 250, LONGEST_MS = 5000; // before it connects again
 
-/** What the server does, in words. */
-export const WORK = {
+// What the server does, in words.
+const WORK = {
   reading: "reading", measure: "measuring", curve: "measuring the curve", train: "training", adapt: "adapting",
-  compare: "comparing", report: "exporting", firmware: "writing firmware",
+  compare: "comparing", report: "exporting",
 };
 
 /**
@@ -107,7 +107,7 @@ function countDown() {
 setInterval(() => working && countDown(), 1000);
 
 /** Return a duration in words. */
-export function duration(seconds) {
+function duration(seconds) {
   if (seconds < 10) return `${Math.max(1, Math.round(seconds))} s`;
   return seconds < 100 ? `${5 * Math.round(seconds / 5)} s` : `${Math.round(seconds / 60)} min`;
 }

@@ -74,10 +74,7 @@ export class View {
 
   /** Take the health of devices and inputs. */
   health(report) {
-    fillTable("devices", ["Device", "State", "Counted"], report.devices.map(({ name, error, connected, counts }) => {
-      const counted = counts.filter(({ value }) => value).map((count) => `${count.name} ${count.value}`);
-      return [name, error || (connected ? "connected" : "not connected"), counted.join(", ") || "nothing"];
-    }));
+    showDevices(report.devices);
     this.quarantined = report.quarantined.map(({ name, reason, used }) =>
       `${name}: ${reason}, ${used ? "still used" : "treated as lost"}`,
     );
@@ -179,4 +176,15 @@ export class View {
     if (wait) this.#timer = setTimeout(speak, wait);
     else speak(); // before another text can take its place
   }
+}
+
+/** Show devices in their table. Equal rows stay, so that one can select and copy what is said of a lost one. */
+export function showDevices(devices) {
+  const rows = devices.map(({ name, error, connected, counts }) => {
+    const counted = counts.filter(({ value }) => value).map((count) => `${count.name} ${count.value}`);
+    return [name, connected ? error || "connected" : `lost: ${error}`, counted.join(", ") || "nothing"];
+  });
+  if (JSON.stringify(rows) === $("devices-table").dataset.rows) return;
+  $("devices-table").dataset.rows = JSON.stringify(rows);
+  fillTable("devices", ["Device", "State", "Counted"], rows);
 }

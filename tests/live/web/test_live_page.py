@@ -241,7 +241,7 @@ def test_names_are_text_wherever_they_are_shown(browser: Any) -> None:
         assert browser.texts("#types .name") == [SCRIPT, image]
         browser.wait(lambda: browser.text("segment") and f"announced {SCRIPT}" in browser.text("place"))
         assert browser.text("preshape") == f"Preshape: {image}"
-        assert browser.texts("#devices th, #devices td") == [image, SCRIPT, f"{image} 1"]
+        assert browser.texts("#devices th, #devices td") == [image, f"lost: {SCRIPT}", f"{image} 1"]
         assert browser.text("name") == image
         assert browser.script("return [document.scripts.length, document.images.length]") == [1, 0]
         assert browser.driver.title == f"{SCRIPT} · thenar"
