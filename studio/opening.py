@@ -3,7 +3,7 @@
 from thenar.drivers.extras import optional
 
 from .choose import ChoosePage
-from .compare import ComparePage
+from .compare import add_compare_page
 from .errors import ErrorsPage
 from .glove import GlovePage
 from .live import StudioLive
@@ -21,9 +21,8 @@ def open_studio(project: Project, address: str, *, token: str | None, jobs: int 
     studio = Studio(project, address, token=token, jobs=jobs, page=page)
     GlovePage(studio)
     RecordPage(studio, WearerPage(studio))
-    choose = ChoosePage(studio)
-    ErrorsPage(studio, choose)
+    ErrorsPage(studio, ChoosePage(studio))
     StudioLive(studio)
-    ComparePage(studio, choose)
+    add_compare_page(studio)
     studio.changed()
     return studio

@@ -108,10 +108,13 @@ def sensors_read(manifest: Manifest) -> dict[str, None]:
     return dict.fromkeys([switch.source for switch in manifest.switches] + [joint.name for joint in manifest.joints])
 
 
-def scan_time_us(elements: Sequence[str]) -> float | None:
-    """Return the time on the wire of a scan of switches and pads by the chips that are proposed; None without any."""
+def scan_time_us(elements: Sequence[str], project: Project | None = None) -> float | None:
+    """Return the time on the wire of a scan of switches and pads; None if the harness does not read them.
+
+    The harness is that of the project; without one, it is the chips that are proposed.
+    """
     try:
-        harness = propose_harness(elements)
+        harness = project.wiring() if project is not None and project.harness.exists() else propose_harness(elements)
         scan = plan_scan(elements, harness)
     except HarnessError:
         return None

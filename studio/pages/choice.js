@@ -1,5 +1,5 @@
-// What pages of the studio share: the sensors that are in use, keys, and what was trained.
-import { $, button, list, make, say, tell } from "./wire.js";
+// What pages of the studio share: the sensors that are in use, boxes, keys, and what was trained.
+import { $, box, button, list, make, say, tell } from "./wire.js";
 
 // The sensors are those of all pages in this tab; a reload and a restart of the server keep them.
 const KEY = "thenar.sensors";
@@ -27,6 +27,22 @@ export function percent(share) {
 /** Return a difference of shares in points, with its sign. */
 export function points(share) {
   return `${share < 0 ? "−" : "+"}${percent(Math.abs(share))}`;
+}
+
+/** Return the time of a scan of sensors, in words. */
+export function scanTime(us) {
+  if (us === null) return "unknown: they are more than the chips of one bus read";
+  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
+}
+
+/**
+ * List members {id, text, checked} as boxes, whose values are the ids. Boxes that stay keep the focus and what a user
+ * ticked.
+ */
+export function listBoxes(element, members, changed) {
+  const before = new Map([...element.children].map((label) => [`${label.control.value} ${label.textContent}`, label]));
+  const labels = members.map(({ id, text, checked }) => before.get(`${id} ${text}`) ?? box(text, changed, { value: id, checked }));
+  if (labels.length !== before.size || labels.some((label, at) => label !== element.children[at])) element.replaceChildren(...labels);
 }
 
 /**

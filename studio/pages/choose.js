@@ -1,5 +1,5 @@
 // The page Choose: sensors are clicked on and off, and the server replies with what they recognise.
-import { interval, percent, points, storeChoice, storedChoice, trained } from "./choice.js";
+import { interval, listBoxes, percent, points, scanTime, storeChoice, storedChoice, trained } from "./choice.js";
 import { draw, drawHand, pressable } from "./hand.js";
 import { openPage } from "./shell.js";
 import { $, box, button, fillTable, list, say, tell } from "./wire.js";
@@ -14,13 +14,9 @@ const measured = new Map(); // accuracies that were measured, by the sensors
 
 const ask = openPage({
   project: ({ sets, state: { aside } }) => {
-    const ids = String(sets.map(({ id }) => id));
-    // Boxes that stay keep the focus.
-    if (ids !== $("sets").dataset.ids) {
-      const use = ({ target }) => ask("use", { id: target.value, value: Number(target.checked) });
-      $("sets").replaceChildren(...sets.map(({ id, name }) => box(name, use, { value: id })));
-      $("sets").dataset.ids = ids;
-    }
+    listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name })), ({ target }) => {
+      ask("use", { id: target.value, value: Number(target.checked) });
+    });
     sets.forEach(({ name }, at) => ($("sets").children[at].control.checked = !aside.includes(name)));
   },
   set: (message) => {
@@ -78,12 +74,6 @@ function listSensors() {
     return box(`${name}, ${kind}${price === null ? "" : `, ${price.toFixed(2)}`}`, () => toggle(sensor));
   });
   $("list").replaceChildren(...boxes);
-}
-
-/** Return the time of a scan of sensors, in words. */
-function scanTime(us) {
-  if (us === null) return "unknown: they are more than the chips of one bus read";
-  return us ? `${us.toFixed(0)} µs on the wire` : "none is read";
 }
 
 function show(reply) {

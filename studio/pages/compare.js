@@ -1,5 +1,5 @@
 // The page Compare: two builds of the project on the same trials, and the report of b.
-import { interval, points } from "./choice.js";
+import { interval, listBoxes, points, scanTime } from "./choice.js";
 import { draw, drawHand } from "./hand.js";
 import { openPage } from "./shell.js";
 import { tag, typeStyles } from "./types.js";
@@ -7,21 +7,16 @@ import { $, fillMenu, fillTable, list, make, say } from "./wire.js";
 
 const SIGNS = { both: "ab", a: "a", b: "b" };
 
-let numbering; // of the recordings in use
-
 const ask = openPage({
-  project: ({ builds, state }) => {
+  project: ({ builds, sets, state }) => {
     const ids = builds.map(({ id }) => id), current = builds.find(({ name }) => name === state.build)?.id ?? ids.at(-1);
     fillMenu($("a"), builds, ids.find((id) => id !== current) ?? current);
     fillMenu($("b"), builds, current);
     $("no-build").hidden = builds.length > 0;
+    // They are compared on all sets in use unless others are ticked.
+    listBoxes($("sets"), sets.map(({ id, name }) => ({ id, text: name, checked: !state.aside.includes(name) })), changed);
     $("compare").disabled = $("report").disabled = !builds.length;
     commands();
-  },
-  set: (set) => {
-    say($("on"), set.why || `On the recordings in use: ${set.name}.`);
-    if (numbering !== set.numbering) changed();
-    numbering = set.numbering;
   },
   commands: ({ report, compare }) => {
     say($("report-command"), report);
@@ -29,7 +24,7 @@ const ask = openPage({
     $("compare").disabled = !compare;
   },
   compare: (compared) => {
-    if (String(compared.ids) === String(request()) && compared.numbering === numbering) show(compared);
+    if (String(compared.ids) === String(request())) show(compared);
   },
   report: ({ said, address, name }) => {
     say($("exported"), said);
@@ -38,25 +33,30 @@ const ask = openPage({
   },
 });
 
-const request = () => [$("a").value, $("b").value];
+const request = () => [$("a"), $("b"), ...$("sets").querySelectorAll(":checked")].map(({ value }) => value);
 
 /** Ask for the commands that do what the buttons do. */
 function commands() {
   if ($("b").value) ask("commands", { id: $("b").value, ids: request() });
 }
 
-function show({ names, hand, kept, found, said }) {
+function show({ builds, hand, kept, found, said, unused }) {
   $("result").hidden = false;
   say($("said"), said);
-  overlay(hand, kept, names);
+  list($("unused"), unused);
+  const rows = [
+    ["Recognised of these trials", ({ right, ends: [low, high] }) => interval({ mean: right / found.trials, low, high })],
+    ["Sensors", (build) => build.sensors],
+    ["Scan of switches and pads", (build) => scanTime(build.scan_us)],
+    ["Tables", (build) => `${build.bytes.toLocaleString("en")} bytes`],
+    ["Accuracy as compiled", (build) => build.stated],
+    ...(builds[0].price === null ? [] : [["Price", ({ price }) => price.toFixed(2)]]),
+  ];
+  fillTable("both", ["", `a: ${builds[0].name}`, `b: ${builds[1].name}`], rows.map(([title, text]) => [title, ...builds.map(text)]));
+  overlay(hand, kept, builds);
   const styles = typeStyles([...found.types.map(({ grasp }) => grasp), ...found.changed.flatMap(({ a, b }) => [a, b])]);
   const types = found.types.map(({ grasp, trials, a, b }) => [tag(styles, grasp), trials, a, b, points((b - a) / trials)]);
-  const [a, b] = [found.a, found.b].map((right, at) => {
-    const [low, high] = found.ends[at];
-    return `${right}: ${interval({ mean: right / found.trials, low, high })}`;
-  });
-  const heads = ["Type", "Trials", `a right: ${names[0]}`, `b right: ${names[1]}`, "Points"];
-  fillTable("types", heads, [["all", found.trials, a, b, points(found.difference)], ...types]);
+  fillTable("types", ["Type", "Trials", "a right", "b right", "Points"], types);
   say($("changed-heading"), `Trials that changed: ${found.changed.length || "none"}; ${found.better} better, ${found.worse} worse with b`);
   fillTable("changed", ["Trial", "True type", "a", "b"], found.changed.map((trial) => {
     const marked = [trial.a, trial.b].map((read) => {
@@ -82,7 +82,7 @@ function overlay(hand, kept, [a, b]) {
     spot.append(draw("text", { class: `sign ${kinds.get(name)} middle` }, SIGNS[kinds.get(name)]));
   }
   $("hand").setAttribute("aria-label", "The hand with the sensors of both builds, which the list names");
-  const titles = { both: "both", a: `only a (${a})`, b: `only b (${b})` };
+  const titles = { both: "both", a: `only a (${a.name})`, b: `only b (${b.name})` };
   list($("legend"), Object.entries(kept).map(([kind, names]) => {
     return `${titles[kind]}: ${names.length ? `${names.length}, ${names.join(", ")}` : "none"}`;
   }));

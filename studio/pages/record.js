@@ -158,13 +158,16 @@ function showTrials(message) {
   $("so-far").hidden = !trials.length;
   if (!trials.some(([trial]) => trial === seen)) $("seen").hidden = true;
   say($("accuracy"), accuracyWords(accuracy));
-  const more = trials.length > $("strip").children.length;
-  $("strip").replaceChildren(...trials.map(([trial, grasp, thing]) => {
+  // Trials that stay keep the focus.
+  const strip = $("strip"), same = [...strip.children].findIndex((item, at) => item.dataset.trial !== String(trials[at]?.[0]));
+  const keep = same < 0 ? Math.min(strip.children.length, trials.length) : same;
+  while (strip.children.length > keep) strip.lastChild.remove();
+  for (const [trial, grasp, thing] of trials.slice(keep)) {
     const show = button(`${trial} `, () => ask("recorded", { trial }), { class: "plain", title: thing });
     show.append(tag(styles, grasp), make("span"));
-    return make("li", {}, show);
-  }));
-  if (more) $("strip-scroll").scrollLeft = $("strip").scrollWidth;
+    strip.append(make("li", { "data-trial": trial }, show));
+    $("strip-scroll").scrollLeft = strip.scrollWidth;
+  }
   markTrials();
 }
 
