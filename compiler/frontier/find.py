@@ -105,7 +105,7 @@ def find_frontier(
         the harness, else by the vendor's formula; of other joints it is left out of every frame, and a sentence of
         `skipped` says so.
     own : int
-        Evaluate the points for new subjects after so many own trials of each type, too; 0: not.
+        Evaluate the points for new subjects after this number of own trials of each type, too; 0: not.
     limits : Limits, optional
         The sensors to keep or to leave out, and prices, for a search among sensors.
     jobs : int

@@ -193,8 +193,8 @@ def later(of: stumps.Stumps, n_switches: int) -> ScoreTables:
 class OneTooMuch(Scorer):
     """Adds a step to the score of the first class."""
 
-    def biased_scores(self, bits: Any, codes: Any) -> Any:
-        first, *others = super().biased_scores(bits, codes)
+    def biased_scores(self, *frame: Any) -> Any:
+        first, *others = super().biased_scores(*frame)
         return [first + 1, *others]
 
 

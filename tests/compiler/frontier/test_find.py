@@ -192,8 +192,8 @@ def test_points_after_own_trials_are_those_that_evaluate_finds(tmp_path: Path) -
         rows = study_wearers(grasp_set, changed(Recipe(), options), (0, 2), 1).rows
         assert point.adapted is not None
         # All of the three have as many trials.
-        for rate, found in zip(point.adapted, rows, strict=True):
-            assert rate.mean == pytest.approx(fmean(found.people))
+        for rate, row in zip(point.adapted, rows, strict=True):
+            assert rate.mean == pytest.approx(fmean(row.people))
             assert (rate.over, rate.total) == (3, 96 - 3 * 4 * 2)
     refusals: dict[str, dict[str, object]] = {
         "record two or more subjects": {"grasp_set": make_set()},
