@@ -10,8 +10,9 @@ from thenar.drivers.calibration import SensorCalibration
 from thenar.drivers.errors import SettingError
 
 from .manifest import Calibration
-from .model.terms.base import HIGHEST_CODE
 
+# Here too, as the table terms load numpy, which is not wanted for help texts.
+HIGHEST_CODE = 65535
 # Readings are integers from -65535 to 65535; readings beyond count as the nearest.
 FARTHEST = 65535
 # Fraction bits of a point's code, and the most integer bits: so all fits into 64 bits.
