@@ -47,9 +47,3 @@ def test_a_damaged_set_is_refused_with_the_reason(grasps: Path, capsys: pytest.C
     for arguments in (["export", str(grasps), "-o", str(grasps.with_name("t.csv"))], ["info", str(grasps)]):
         assert run(arguments) == 2
         assert capsys.readouterr().err.startswith("thenar: set.grasps is truncated: ")
-
-
-def test_an_unwritable_columns_file_stops_the_export_before_it_begins(grasps: Path) -> None:
-    columns = grasps.with_name("no") / "columns.toml"
-    assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv")), "--columns", str(columns)]) == 2
-    assert [path.name for path in grasps.parent.iterdir()] == ["set.grasps"]

@@ -12,8 +12,6 @@ from thenar.stability import cases
 from thenar.stability import report as catalogue
 from thenar.stability.finding import Case
 
-from .conftest import refusal
-
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
 CASE = """
@@ -50,10 +48,6 @@ def here(folder: Path, capsys: pytest.CaptureFixture[str]) -> Thenar:
         return subprocess.CompletedProcess(arguments, code, *capsys.readouterr())
 
     return run_here
-
-
-def test_a_case_of_another_name_is_refused_with_the_nearest() -> None:
-    assert "there is no case 'seperable' (did you mean 'separable'" in refusal("stability", "seperable")
 
 
 def test_cases_that_hold_exit_with_0_and_print_error_bound_and_verdict(here: Thenar) -> None:
