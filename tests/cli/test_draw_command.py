@@ -9,7 +9,7 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.body.layout import murakami160
 
-from .conftest import refusal
+from .conftest import refusal, works
 
 NAMES = tuple(patch.name for patch in murakami160())
 
@@ -38,22 +38,19 @@ def marks(svg: Path, hand: int = 0) -> list[str]:
     return [name for name, _ in sorted(kept, key=lambda words: int(words[1]))]
 
 
-def test_the_glove_is_drawn_with_a_name_a_switch(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_glove_is_drawn_with_a_name_a_switch(tmp_path: Path) -> None:
     plain = tmp_path / "plain.SVG"
-    assert run(["draw", "-o", str(plain)]) == 0
+    assert works("draw", "-o", plain).stdout == f"{plain}: 1 hand\n"
     assert plain.read_text().count("<title>") == 160
-    assert capsys.readouterr().out == f"{plain}: 1 hand\n"
 
 
-def test_contacts_are_drawn_together_and_by_type(
-    glove_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_contacts_are_drawn_together_and_by_type(glove_file: Path, tmp_path: Path) -> None:
     together, by_type = tmp_path / "together.png", tmp_path / "by_type.svg"
-    assert run(["draw", str(glove_file), "-o", str(together)]) == 0
-    assert run(["draw", str(glove_file), "--per-grasp", "-o", str(by_type)]) == 0
+    works("draw", glove_file, "-o", together)
+    said = works("draw", glove_file, "--per-grasp", "-o", by_type).stdout
     assert together.read_bytes().startswith(b"\x89PNG")
     assert by_type.read_text().count("<title>") == 3 * 160
-    assert f"{by_type}: 3 hands" in capsys.readouterr().out
+    assert f"{by_type}: 3 hands" in said
 
 
 def test_a_placement_a_build_and_lists_are_drawn_side_by_side(

@@ -116,6 +116,7 @@ def test_what_did_not_settle_is_kept_when_asked(hasty: Path, tmp_path: Path) -> 
 def test_shipped_scenes_are_listed_with_what_they_are() -> None:
     lines = works("simulate", "--list").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(shipped())
+    assert len(lines) == 12
     assert all("Simulated." in line for line in lines)
     assert [scene["name"] for scene in json.loads(works("simulate", "--list", "--json").stdout)] == list(shipped())
 
