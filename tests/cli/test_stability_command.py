@@ -52,7 +52,7 @@ def test_cases_that_hold_exit_with_0_and_print_error_bound_and_verdict() -> None
     assert done.stdout.splitlines()[-1] == "1 case quickly, 1 check on 3 inputs: all hold"
 
 
-def test_a_bound_that_does_not_hold_exits_with_1_and_says_wjudged() -> None:
+def test_a_bound_that_does_not_hold_exits_with_1_and_says_where() -> None:
     done = judged("sound", "exceeding")
     assert done.returncode == 1
     assert done.stdout.splitlines()[-2] == (
