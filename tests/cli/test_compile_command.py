@@ -1,11 +1,6 @@
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
-
-from thenar.compiler import GraspSet
 
 from .conftest import thenar, works
 
@@ -53,19 +48,3 @@ def test_a_tolerance_ends_the_training_and_the_build_says_so(set_file: Path, tmp
     assert 1 < rounds < 500
     assert f"stopped after {rounds} of 500 rounds: the last changed the mean loss by less than 0.01" in done.stdout
     assert thenar(*given, "--tolerance", "nan").returncode == 2
-
-
-def test_a_build_that_answers_one_grasp_type_only_says_so(small_set: GraspSet, tmp_path: Path) -> None:
-    either, other = np.arange(60) % 2 == 1, np.arange(60) // 2 % 2 == 1
-    exclusive_or = replace(
-        small_set,
-        switches=np.column_stack([either, other]),
-        switch_names=("s0", "s1"),
-        codes=small_set.codes[:, :0],
-        joints=(),
-        grasps=np.where(either ^ other, "cup", "rod"),
-    )
-    exclusive_or.save(tmp_path / "xor.grasps")
-    done = works("compile", tmp_path / "xor.grasps", "-o", tmp_path / "build", "--folds", 0)
-    assert "for every row: no single input distinguishes grasp types" in " ".join(done.stderr.split())
-    assert "no switch alone gains anything" in done.stdout

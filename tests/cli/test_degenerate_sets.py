@@ -124,5 +124,7 @@ def test_an_exclusive_or_is_placed_explained_and_built(tmp_path: Path, capsys: p
     assert "s0?  4 rows, no input gains anything alone" in tree
     assert "2 of 2 switches" in table
     assert "at 1 node no switch gains anything alone" in table
-    command(capsys, "compile", path, "-o", tmp_path / "build", "--folds", 0)
+    _, made, warned = command(capsys, "compile", path, "-o", tmp_path / "build", "--folds", 0)
+    assert "for every row: no single input distinguishes grasp types" in " ".join(warned.split())
+    assert "no switch alone gains anything" in made
     assert json.loads((tmp_path / "build" / "build.json").read_bytes())["zero_gain_nodes"] == 1

@@ -9,7 +9,7 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.body.layout import murakami160
 
-from .conftest import refusal
+from .conftest import refusal, works
 
 NAMES = tuple(patch.name for patch in murakami160())
 
@@ -38,22 +38,19 @@ def marks(svg: Path, hand: int = 0) -> list[str]:
     return [name for name, _ in sorted(kept, key=lambda words: int(words[1]))]
 
 
-def test_the_glove_is_drawn_with_a_name_a_switch(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_glove_is_drawn_with_a_name_a_switch(tmp_path: Path) -> None:
     plain = tmp_path / "plain.SVG"
-    assert run(["draw", "-o", str(plain)]) == 0
+    assert works("draw", "-o", plain).stdout == f"{plain}: 1 hand\n"
     assert plain.read_text().count("<title>") == 160
-    assert capsys.readouterr().out == f"{plain}: 1 hand\n"
 
 
-def test_contacts_are_drawn_together_and_by_type(
-    glove_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_contacts_are_drawn_together_and_by_type(glove_file: Path, tmp_path: Path) -> None:
     together, by_type = tmp_path / "together.png", tmp_path / "by_type.svg"
-    assert run(["draw", str(glove_file), "-o", str(together)]) == 0
-    assert run(["draw", str(glove_file), "--per-grasp", "-o", str(by_type)]) == 0
+    works("draw", glove_file, "-o", together)
+    said = works("draw", glove_file, "--per-grasp", "-o", by_type).stdout
     assert together.read_bytes().startswith(b"\x89PNG")
     assert by_type.read_text().count("<title>") == 3 * 160
-    assert f"{by_type}: 3 hands" in capsys.readouterr().out
+    assert f"{by_type}: 3 hands" in said
 
 
 def test_a_placement_a_build_and_lists_are_drawn_side_by_side(
@@ -92,7 +89,10 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(set_file:
         (b"[1, 2]", "is not a list of switches (Expected `str`, got `int` - at `$[0]`)"),
         (b'["palm_heel_1", ', "is not a list of switches (Input data was truncated)"),
         (b"\xff\xfe\x00", "is not a text file"),
-        (b"palm_heel_1\npalm_hel_2", "'palm_hel_2' is no switch of the glove murakami160 (did you mean 'palm_heel_2'"),
+        (
+            b"palm_heel_1\npalm_hel_2\nnonsense",
+            "'palm_hel_2' is no switch of the glove murakami160 (did you mean 'palm_heel_2'",
+        ),
         (b"palm_heel_1\npalm_heel_1", "switch 'palm_heel_1' is kept twice"),
     ],
 )
@@ -107,16 +107,13 @@ def test_a_file_that_lists_no_switches_is_refused_with_the_reason(content: bytes
         (["--per-grasp"], "needs recordings"),
         (["--kept", "nowhere.json"], "'nowhere.json' does not exist"),
         (["GRASPS", "--kept", "GRASPS"], "leave GRASPS out"),
-        (["-o", "glove.pdf"], "must end in .svg or .png"),
-        (["-o", "no/such/glove.svg"], "There is no folder 'no/such'"),
     ],
 )
 def test_a_mistake_is_one_sentence_and_code_two(
     glove_file: Path, options: list[str], reason: str, tmp_path: Path
 ) -> None:
     words = [str(glove_file) if word == "GRASPS" else word for word in options]
-    output = [] if "-o" in words else ["-o", str(tmp_path / "no.svg")]
-    assert reason in refusal("draw", *words, *output)
+    assert reason in refusal("draw", *words, "-o", tmp_path / "no.svg")
 
 
 def test_nothing_that_is_read_is_written_over(tmp_path: Path) -> None:

@@ -132,19 +132,11 @@ def test_a_grasp_type_too_rare_for_folds_warns_on_stderr(tmp_path: Path, capsys:
         (["--by", "object"], "leaving one object out needs two or more"),
         (["--folds", "100"], "24 rows cannot be cut into 100 folds"),
         (["--folds", "1"], "--folds"),
-        (["-o", "no/such/result.json"], "There is no folder 'no/such'"),
         (["--prune-list", "0,x"], "'0,x' is not a list of whole numbers such as 0,13,62"),
-        (["--tables", "composition"], "there is no table 'composition' (did you mean 'compositions'"),
     ],
 )
-def test_a_users_mistake_ends_with_2_and_a_sentence(
-    grasps: str, arguments: list[str], reason: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["evaluate", grasps, *QUICK, *arguments]) == 2
-    printed, complaints = capsys.readouterr()
-    assert not printed
-    assert reason in complaints
-    assert "Traceback" not in complaints
+def test_a_users_mistake_ends_with_2_and_a_sentence(grasps: str, arguments: list[str], reason: str) -> None:
+    assert reason in refusal("evaluate", grasps, *QUICK, *arguments)
 
 
 def test_trainers_are_compared_in_a_table(grasps: str) -> None:

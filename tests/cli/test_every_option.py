@@ -191,3 +191,5 @@ def test_every_command_that_writes_a_file_can_be_asked_to_replace_it() -> None:
             assert "overwrite" in parameters, command
         for each in written:
             assert each.endings, command
+        for name in parameters.keys() & {"output", "draw"}:
+            assert isinstance(parameters[name].type, OutputFile | OutputFolder), (command, name)

@@ -156,7 +156,6 @@ def test_a_gloves_ranges_calibrate_its_pins(build: Path, tmp_path: Path) -> None
     ("arguments", "message"),
     [
         (("--target", "avr328p"), "name a folder to write with -o"),
-        (("--target", "pdp11", "-o", "made"), "there is no target 'pdp11': choose one of host"),
         (("-o", "made"), "A library needs a target: name one with --target"),
         (("--mode", "rows", "-o", "made"), "name them with --glove and -o"),
         (("--mode", "rows", "--glove", "{glove}"), "name them with --glove and -o"),

@@ -51,7 +51,6 @@ def test_no_points_and_one_subject_print_too(examples: Any, capsys: pytest.Captu
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--methods", "nonsense"), "there is no method 'nonsense'"),
         (("--budget-us", "5", "--rate", "0.5"), "give one of them"),
         (("--rate", "1.5"), "1.5 is not in the range"),
     ],

@@ -13,7 +13,7 @@ from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.session import Collection, CollectionTask, Label, Session
 from thenar.runtime.recording.writer import Recorder
 
-from .conftest import works
+from .conftest import refusal, works
 
 TABLE = "label,who,s1,s2,j1\nmug,A,0,0,10.2\nball,A,1,0,20\nmug,B,0,0,30\nball,B,1,0,\n"
 COLUMNS = """label = "label"
@@ -71,10 +71,10 @@ def test_the_old_set_stays_when_the_import_fails(folder: Path) -> None:
     assert (folder / "set.grasps").read_bytes() == before
 
 
-def test_the_columns_file_is_never_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_columns_file_is_never_overwritten(folder: Path) -> None:
     columns = (folder / "columns.toml").rename(folder / "c.grasps")
-    assert run(["import", str(folder / "table.csv"), "-o", str(columns), "--columns", str(columns), "--overwrite"]) == 2
-    assert "c.grasps is named twice" in capsys.readouterr().err
+    given = ("import", folder / "table.csv", "-o", columns, "--columns", columns, "--overwrite")
+    assert "c.grasps is named twice" in refusal(*given)
     assert columns.read_text() == COLUMNS
 
 
@@ -248,13 +248,7 @@ def test_a_recording_needs_no_columns(recording: Path, folder: Path, capsys: pyt
     ],
 )
 def test_what_cannot_be_imported_together_is_told(
-    recording: Path,
-    folder: Path,
-    arguments: tuple[str, ...],
-    said: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    recording: Path, folder: Path, arguments: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(folder)
-    assert run(["import", *arguments, "-o", "set.grasps"]) == 2
-    assert said in capsys.readouterr().err
+    assert said in refusal("import", *arguments, "-o", "set.grasps")

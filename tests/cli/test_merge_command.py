@@ -55,10 +55,6 @@ def test_files_of_one_name_of_trials_are_told_apart_by_their_session(files: tupl
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (
-            ("merge", "{anna}", "{ben}", "-o", "{folder}/all.csv"),
-            "all.csv: the name of the output file must end in .grasps",
-        ),
         (("merge", "{anna}", "{anna}", "-o", "{folder}/all.grasps"), "is named twice"),
         (("merge", "{anna}", "{ben}", "-o", "{anna}"), "already exists: add --overwrite"),
         (("merge", "{anna}", "{ben}", "-o", "{anna}", "--overwrite"), "is named twice"),

@@ -20,12 +20,6 @@ def test_progress_is_drawn_on_a_terminal_with_the_name_as_it_is(
     assert said.out == ""
 
 
-def test_no_progress_is_drawn_into_a_file(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress("importing") as report:
-        report(3, 7)
-    assert capsys.readouterr() == ("", "")
-
-
 def test_one_file_under_two_names_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "link").symlink_to("a")

@@ -76,7 +76,6 @@ def test_the_kept_switches_of_a_choice_of_sensors_can_be_drawn(set_file: Path, t
         (["--method", "elimination"], "method 'elimination' needs --keep M"),
         (["--keep", "3"], "method 'id3' takes --prune S and no --keep"),
         (["--method", "cmim", "--keep", "3", "--prune", "4"], "method 'cmim' takes --keep M and no --prune"),
-        (["--method", "elimintion"], "there is no method 'elimintion' (did you mean 'elimination'"),
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
         (
             ["--method", "cmim", "--keep", "3", "--draw", "a.svg"],

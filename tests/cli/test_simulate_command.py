@@ -9,18 +9,10 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.scenes import shipped
 
-from .conftest import works
+from .conftest import refusal, works
 
 SMALL = ("--jobs", "1", "--repetitions", "1")
 Captured = pytest.CaptureFixture[str]
-
-
-def complaint(captured: Captured) -> str:
-    printed, complaints = captured.readouterr()
-    assert not printed
-    assert complaints.startswith("thenar: ")
-    assert complaints.count("\n") == 1
-    return complaints
 
 
 def test_a_shipped_scene_becomes_a_set_and_says_that_it_is_simulated(tmp_path: Path, capsys: Captured) -> None:
@@ -124,6 +116,7 @@ def test_what_did_not_settle_is_kept_when_asked(hasty: Path, tmp_path: Path) -> 
 def test_shipped_scenes_are_listed_with_what_they_are() -> None:
     lines = works("simulate", "--list").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(shipped())
+    assert len(lines) == 12
     assert all("Simulated." in line for line in lines)
     assert [scene["name"] for scene in json.loads(works("simulate", "--list", "--json").stdout)] == list(shipped())
 
@@ -134,7 +127,6 @@ def test_shipped_scenes_are_listed_with_what_they_are() -> None:
         (["quick"], "name the set to write: -o SET.grasps"),
         ([], "name a scene"),
         (["quick", "--list"], "--list shows all shipped scenes: give it alone"),
-        (["quik"], "no shipped scene is called 'quik' (did you mean 'quick'?)"),
         (["no/such.toml"], "such.toml"),
         (["quick", "--subject", "Q"], "scene quick has no subject 'Q'"),
         (["quick", "--subjects", "3"], "scene quick has 2 subject(s), 3 are requested"),
@@ -146,9 +138,10 @@ def test_shipped_scenes_are_listed_with_what_they_are() -> None:
         ),
     ],
 )
-def test_what_cannot_be_done_is_one_sentence(arguments: list[str], reason: str, capsys: Captured) -> None:
-    assert run(["simulate", *arguments]) == 2
-    assert reason in complaint(capsys)
+def test_what_cannot_be_done_is_one_sentence(arguments: list[str], reason: str) -> None:
+    said = refusal("simulate", *arguments)
+    assert reason in said
+    assert (said[:8], said.count("\n")) == ("thenar: ", 1)
 
 
 @pytest.mark.parametrize(
@@ -158,11 +151,10 @@ def test_what_cannot_be_done_is_one_sentence(arguments: list[str], reason: str, 
         ("[effects.switch.stuck_open]\ncount = 161", "line 46: effects.switch.stuck_open.count: 161 switches cannot"),
     ],
 )
-def test_faults_of_combined_effects_name_file_and_line(
-    added: str, sentence: str, tmp_path: Path, capsys: Captured
-) -> None:
+def test_faults_of_combined_effects_name_file_and_line(added: str, sentence: str, tmp_path: Path) -> None:
     scene = tmp_path / "bad.toml"
     text = shipped()["quick"].read_text()
     scene.write_text(text + "\n" * (44 - text.count("\n")) + added)
-    assert run(["simulate", str(scene), "-o", str(tmp_path / "set.grasps")]) == 2
-    assert complaint(capsys).startswith(f"thenar: bad.toml, {sentence}")
+    said = refusal("simulate", scene, "-o", tmp_path / "set.grasps")
+    assert said.startswith(f"thenar: bad.toml, {sentence}")
+    assert said.count("\n") == 1

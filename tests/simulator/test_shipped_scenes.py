@@ -37,23 +37,6 @@ def sizes(scene: Scene) -> dict[str, tuple[float, float]]:
     return {subject.name: (subject.hand_length_mm, subject.hand_breadth_mm) for subject in scene.subjects}
 
 
-def test_these_scenes_are_shipped() -> None:
-    assert list(shipped()) == [
-        "continuous",
-        "continuous-def",
-        "continuous-rest",
-        "crowd",
-        "cutkosky",
-        "cutkosky-def",
-        "faulty-glove",
-        "initial-contact",
-        "kamakura",
-        "kamakura-analog",
-        "kamakura-def",
-        "quick",
-    ]
-
-
 @pytest.mark.parametrize("name", shipped())
 def test_a_shipped_scene_says_that_it_is_simulated_and_can_be_compiled(name: str) -> None:
     assert shipped()[name].read_text().startswith("# Simulated. ")

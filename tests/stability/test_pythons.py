@@ -25,10 +25,6 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_machine_without_other_pythons_has_none(machine: Path) -> None:
-    assert list(pythons.found()) == []
-
-
 @pytest.mark.parametrize("version", OTHERS)
 def test_a_python_on_the_path_is_found(machine: Path, version: str) -> None:
     python = program(machine / "bin" / f"python{version}", f"echo {version}.7")

@@ -1,7 +1,5 @@
 """`murakami160`: 160 switches on the palm side and the sides of the fingers, on every hand."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -20,11 +18,6 @@ def own_axes(hand: Hand) -> tuple[np.ndarray, np.ndarray]:
     """Return the tops of all switches on the axes of their capsules: (s, 3), and the capsules (s,)."""
     switches = SwitchPlaces(hand, LAYOUT)
     return switches.places, switches.capsules
-
-
-def test_thumb_and_thenar_and_each_finger_have_26_the_palm_has_30() -> None:
-    per_digit = Counter(patch.name.split("_")[0] for patch in LAYOUT)
-    assert per_digit == {"thumb": 26, "index": 26, "middle": 26, "ring": 26, "little": 26, "palm": 30}
 
 
 def test_switches_are_numbered_capsule_by_capsule_and_named_after_them() -> None:

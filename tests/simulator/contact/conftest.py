@@ -11,15 +11,11 @@ from thenar.simulator.planning.postures import Postures
 SCENES = ("kamakura", "cutkosky")
 
 
-def _planned(scene_name: str) -> tuple[Condition, ...]:
-    scene = load_scene(scene_name)
-    return sessions(scene, Postures.shipped(scene.taxonomy))[0].conditions
-
-
 @pytest.fixture(scope="session")
 def planned() -> dict[str, tuple[Condition, ...]]:
     """How the first subject of both shipped scenes holds every object."""
-    return {name: _planned(name) for name in SCENES}
+    scenes = {name: load_scene(name) for name in SCENES}
+    return {name: sessions(scene, Postures.shipped(scene.taxonomy))[0].conditions for name, scene in scenes.items()}
 
 
 @pytest.fixture(scope="session")

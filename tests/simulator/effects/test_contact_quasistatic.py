@@ -6,13 +6,13 @@ import pytest
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.shapes import Pose
 from thenar.simulator.contact.balance import Skin
-from thenar.simulator.contact.model import Contact, ContactModel, Load
+from thenar.simulator.contact.model import Contact, ContactModel
 from thenar.simulator.effects.contact_quasistatic import USUAL_SKIN, Quasistatic, model
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.pipeline.simulation import sessions
 from thenar.simulator.planning.postures import Postures
 
-from ..small import make_setting
+from ..small import make_load, make_setting
 
 FIELDS = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n", "settled", "residual_n", "residual_nmm")
 
@@ -34,20 +34,13 @@ def default() -> ContactModel:
     return model(make_setting())
 
 
-def load(condition: Condition, n: int = 3, seed: int = 1) -> Load:
-    draw, held = np.random.default_rng(seed), condition.held
-    pose = held.pose + draw.normal(size=(n, 6)) * np.array([1.5] * 3 + [0.044] * 3)
-    grip_n = held.grip_n * np.exp(0.25 * draw.normal(size=n))
-    return Load(condition, held.posture_deg + 1.5 * draw.normal(size=(n, 20)), pose, grip_n)
-
-
 def assert_same(one: Contact, other: Contact, rows: slice = slice(None)) -> None:
     for field in FIELDS:
         assert np.array_equal(getattr(one, field), getattr(other, field)[rows]), field
 
 
 def test_no_force_is_lost_between_segments_and_switches(conditions: list[Condition], default: ContactModel) -> None:
-    for contact in default([load(condition) for condition in conditions]):
+    for contact in default([make_load(condition) for condition in conditions]):
         shared = contact.forces_n.sum(axis=1) + contact.between_n
         assert shared == pytest.approx(contact.capsules_n.sum(axis=1), rel=1e-12)
         assert (contact.forces_n >= 0.0).all()
@@ -55,7 +48,7 @@ def test_no_force_is_lost_between_segments_and_switches(conditions: list[Conditi
 
 
 def test_loads_of_several_hands_come_back_in_their_order(conditions: list[Condition], default: ContactModel) -> None:
-    loads = [load(condition, 2 + number % 3) for number, condition in enumerate(conditions)]
+    loads = [make_load(condition, 2 + number % 3) for number, condition in enumerate(conditions)]
     assert len({id(one.condition.hand) for one in loads}) > 1
     mixed = loads[::2] + loads[1::2]  # hands in turn, so that none of them stands together
     for one, contact in zip(mixed, default(mixed), strict=True):
@@ -65,14 +58,14 @@ def test_loads_of_several_hands_come_back_in_their_order(conditions: list[Condit
 def test_more_repetitions_than_are_solved_at_a_time_come_out_the_same(
     conditions: list[Condition], default: ContactModel
 ) -> None:
-    many = [load(conditions[0], 300, seed) for seed in range(3)]  # bundles hold about 512
+    many = [make_load(conditions[0], 300, seed) for seed in range(3)]  # bundles hold about 512
     together = default(many)
     assert_same(default(many[2:])[0], together[2])
     assert_same(default(many[:1])[0], together[0])
 
 
 def test_a_pose_at_rest_is_where_the_object_is_felt(conditions: list[Condition], default: ContactModel) -> None:
-    told = load(conditions[0], 4)
+    told = make_load(conditions[0], 4)
     (contact,) = default([told])
     condition = told.condition
     centres = condition.hand.spheres(condition.hand.skeleton(np.radians(contact.posture_deg.T)))
@@ -89,7 +82,7 @@ def test_a_pose_at_rest_is_where_the_object_is_felt(conditions: list[Condition],
 
 
 def test_a_switch_that_reaches_further_feels_more(conditions: list[Condition]) -> None:
-    told = [load(condition) for condition in conditions]
+    told = [make_load(condition) for condition in conditions]
     lost = [
         sum(contact.between_n.sum() for contact in model(make_setting(), reach_mm=reach)(told))
         for reach in (0.0, 1.0, 3.0)
@@ -98,7 +91,7 @@ def test_a_switch_that_reaches_further_feels_more(conditions: list[Condition]) -
 
 
 def test_what_does_not_come_to_rest_is_marked(conditions: list[Condition]) -> None:
-    (contact,) = model(make_setting(), most_steps=1)([load(conditions[0])])
+    (contact,) = model(make_setting(), most_steps=1)([make_load(conditions[0])])
     assert not contact.settled.any()
     assert contact.steps == 3
 
@@ -110,5 +103,5 @@ def test_skins_at_the_limits_give_finite_results(
     conditions: list[Condition], press_n_per_mm: float, soft_mm: float, drag_n_per_mm: float
 ) -> None:
     skin = Skin(press_n_per_mm, soft_mm, drag_n_per_mm, USUAL_SKIN.friction)
-    for contact in Quasistatic(skin).solve([load(condition, 1) for condition in conditions[:3]]):
+    for contact in Quasistatic(skin).solve([make_load(condition, 1) for condition in conditions[:3]]):
         assert all(np.isfinite(getattr(contact, field)).all() for field in FIELDS)

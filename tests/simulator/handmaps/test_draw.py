@@ -120,11 +120,6 @@ def test_names_in_titles_are_neither_formulas_nor_markup() -> None:
     assert titles(draw(Picture(HAND, (Panel("", "", dots),), "", "switch"), "svg"))[0] == "a < b & c"
 
 
-def test_a_switch_kept_twice_is_refused() -> None:
-    with pytest.raises(MapError, match=f"pooled: switch '{NAMES[4]}' is kept twice"):
-        kept(HAND, [("pooled", [NAMES[4], NAMES[5], NAMES[4]])])
-
-
 def test_sets_that_are_not_of_this_glove_are_refused() -> None:
     bits = np.ones((1, 2), bool)
     with pytest.raises(MapError, match="'s1' is no switch of the glove"):

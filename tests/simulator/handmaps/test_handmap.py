@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thenar.compiler.hand import HandShape, MapError
-from thenar.drivers.errors import ThenarError
+from thenar.compiler.hand import HandShape
 from thenar.simulator.body.layout import SwitchPlaces, murakami160
 from thenar.simulator.handmaps.handmap import HAND, PARTS, RADIUS_MM, hand_map, outlines, rays
 
@@ -86,16 +85,3 @@ def test_it_is_a_right_hand_seen_from_its_palm(glove: HandShape) -> None:
 def test_what_is_near_on_the_hand_is_near_on_paper(glove: HandShape) -> None:
     hand, paper = distances(on_the_hand()), distances(glove.places)
     assert np.corrcoef(hand, paper)[0, 1] > 0.9
-
-
-def test_names_are_found_in_any_order(glove: HandShape) -> None:
-    assert glove.numbers_of(["palm_heel_6", "thumb_metacarpal_1"]).tolist() == [159, 0]
-    assert glove.numbers_of([]).tolist() == []
-
-
-def test_the_first_strange_name_is_told_with_the_nearest(glove: HandShape) -> None:
-    with pytest.raises(
-        MapError, match=r"'index_distl_1' is no switch of the glove murakami160 \(did you mean 'index_d"
-    ):
-        glove.numbers_of(["palm_heel_6", "index_distl_1", "nonsense"])
-    assert issubclass(MapError, ThenarError)

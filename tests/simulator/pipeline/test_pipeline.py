@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, hold_frame
@@ -32,14 +33,10 @@ EVERYTHING = ["contact.quasistatic", *OTHERS]
 SUBSETS = st.sets(st.sampled_from(OTHERS)).map(lambda others: ["contact.quasistatic", *sorted(others)])
 
 
-def listed_with(name: str, **parameters: Any) -> tuple:
-    return name, parameters
-
-
 def light() -> list[tuple]:
     """Return all effects but the contact model: the ramp in two levels, the bus as it reads all that it can."""
     special: dict[str, dict[str, Any]] = {"contact.ramp": {"levels": 2}, "bus.latency": {"jitter_us": 20.0}}
-    return [listed_with(name, **special.get(name, {})) for name in OTHERS]
+    return [(name, special.get(name, {})) for name in OTHERS]
 
 
 def order(scene: Scene) -> list[str]:
@@ -60,16 +57,11 @@ def test_a_pipeline_holds_only_scene_effects_and_glove_steps(names: list[str]) -
 def test_the_order_is_that_of_the_numbers_however_the_scene_lists_them(names: list[str], seed: int) -> None:
     scene = make_scene(names)
     shuffled = np.random.default_rng(seed).permutation(len(names))
-    other = make_scene(names, name="other")
-    mixed = Scene(**{f: getattr(other, f) for f in other.__struct_fields__} | {"effects": _pick(scene, shuffled)})
+    mixed = replace(scene, effects=tuple(scene.effects[place] for place in shuffled))
     assert order(mixed) == order(scene)
     stops = compile_pipeline(scene).steps
     numbers = [stop.effect.order for stop in stops]
     assert numbers == sorted(numbers)
-
-
-def _pick(scene: Scene, places: np.ndarray) -> tuple:
-    return tuple(scene.effects[place] for place in places)
 
 
 def test_the_order_of_everything() -> None:

@@ -76,11 +76,6 @@ def test_rests_vary_and_join_consecutive_trials() -> None:
     assert (batch.rest_deg <= LIMITS_DEG[:, 1]).all()
 
 
-def test_without_style_and_posture_all_rest_alike() -> None:
-    batch = run(make_scene(["hand.transition"], recording=MOVING), make_batch(range(4)))
-    assert np.array_equal(np.asarray(batch.rest_deg), np.tile(RESTS_DEG["relaxed"], (4, 1)))
-
-
 @pytest.mark.parametrize("name", ["continuous", "faulty-glove"])
 def test_a_rest_changes_no_draw_of_any_other_frame(name: str) -> None:
     """Nor does it change a switch before; only the joints of the way to the grasp come from elsewhere."""

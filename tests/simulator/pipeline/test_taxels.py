@@ -1,6 +1,5 @@
 """A glove with taxels: forces frame by frame, counts, and the set that comes of them."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,28 +21,21 @@ ALL = SceneGlove(taxels="all")
 LOSES: Any = {"rate": 0.02}
 
 
-@pytest.fixture
-def run() -> Callable[..., Batch]:
-    """Return a function of effects and changes of the scene that returns the batch as the pipeline leaves it."""
-
-    def make(effects: tuple[str, ...] = (), **changes: object) -> Batch:
-        batch = make_batch(range(3))
-        compile_pipeline(make_scene(effects, glove=ALL, **changes)).run([batch], Ledger())
-        return batch
-
-    return make
+def run(*effects: str, **changes: object) -> Batch:
+    """Return a batch as the pipeline of effects leaves it, with changes of the scene."""
+    batch = make_batch(range(3))
+    compile_pipeline(make_scene(effects, glove=ALL, **changes)).run([batch], Ledger())
+    return batch
 
 
-def test_without_effects_counts_are_the_contact_force_in_millinewtons(
-    run: Callable[..., Batch],
-) -> None:
+def test_without_effects_counts_are_the_contact_force_in_millinewtons() -> None:
     batch = run()
     assert batch.taxels is not None
     assert batch.forces_n.max() > 1.0
     np.testing.assert_array_equal(batch.taxels[:, 0], np.rint(batch.forces_n * 1000.0))
 
 
-def test_taxels_feel_nothing_before_contact_and_after_release(run: Callable[..., Batch]) -> None:
+def test_taxels_feel_nothing_before_contact_and_after_release() -> None:
     batch = run(recording=Recording(rows="all", lead_ms=30.0, hold_ms=50.0, release_ms=40.0))
     held = (batch.frame_us[0] >= 0) & (batch.frame_us[0] < 60_000)
     assert held.sum() == 6
@@ -51,11 +43,9 @@ def test_taxels_feel_nothing_before_contact_and_after_release(run: Callable[...,
     assert not batch.taxels_n[:, ~held].any()
 
 
-def test_ramped_taxels_pass_thresholds_when_switches_change(
-    run: Callable[..., Batch],
-) -> None:
+def test_ramped_taxels_pass_thresholds_when_switches_change() -> None:
     recording = Recording(rows="all", rate_hz=1000.0, lead_ms=10.0, hold_ms=250.0, release_ms=220.0)
-    batch = run(("contact.ramp",), recording=recording)
+    batch = run("contact.ramp", recording=recording)
     assert batch.bits.any()
     # To a rounding of times to microseconds: never further from the threshold than force changes in one.
     differ = batch.bits != (batch.taxels_n > batch.thresholds_n)
@@ -113,10 +103,8 @@ def test_an_effect_on_taxels_needs_some(name: str) -> None:
         compile_pipeline(make_scene([name], glove=SceneGlove()))
 
 
-def test_counts_go_over_the_boards_line_and_come_through_where_nothing_happens(
-    run: Callable[..., Batch],
-) -> None:
-    plain, sent = run(("taxel.noise",)), run(("taxel.noise", "wire.lost_bytes"))
+def test_counts_go_over_the_boards_line_and_come_through_where_nothing_happens() -> None:
+    plain, sent = run("taxel.noise"), run("taxel.noise", "wire.lost_bytes")
     assert plain.taxels is not None
     assert sent.taxels is not None
     assert sent.lost is not None

@@ -13,10 +13,8 @@ from thenar.simulator.body.shapes import Shape, Sphere, rotation
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.scene_file import load_scene
 from thenar.simulator.planning.plan import (
-    Work,
     average_hand,
     lacking,
-    plan_object,
     planned,
     postures_of,
     shipped_prehensions,
@@ -122,13 +120,6 @@ def check_on_the_same_way_down(entry: Entry, known: Entry, taxonomy: str, length
     assert apart(today, shipped) < min(0.15, 20.0 * np.sqrt(2e-6 * least))
     assert max(cost(misfit, today), cost(misfit, shipped)) < 1.0001 * least
     assert apart(bottom(misfit, today), lowest) < BOTTOM
-
-
-def test_the_shipped_posture_of_a_bead_is_what_is_planned_today() -> None:
-    work = Work("Tip", shipped_prehensions("kamakura14")["Tip"], BEAD.thing(), 180.0, 210.0)
-    known = SHIPPED.entry("Tip", BEAD.thing())
-    assert known is not None
-    assert np.abs(figures(plan_object(work)) - figures(known)).max() < ROUNDING
 
 
 @pytest.mark.slow

@@ -30,11 +30,14 @@ def objects(grasps: list[str]) -> tuple[SceneObject, ...]:
     return tuple(SceneObject(name=f"ball {n}", grasp=g, shape=ball, mass_g=80.0) for n, g in enumerate(grasps))
 
 
+def scene_of(grasps: list[str], repetitions: int) -> Scene:
+    made = objects(grasps)
+    return Scene(name="x", seed=1, taxonomy="own", objects=made, subjects=(), repetitions=repetitions, effects=())
+
+
 @given(grasps=st.lists(st.sampled_from("abc"), min_size=1, max_size=12), repetitions=st.integers(1, 50))
 def test_every_grasp_type_gets_all_repetitions_and_its_objects_even_shares(grasps: list[str], repetitions: int) -> None:
-    scene = Scene(
-        name="x", seed=1, taxonomy="own", objects=objects(grasps), subjects=(), repetitions=repetitions, effects=()
-    )
+    scene = scene_of(grasps, repetitions)
     shares = list(scene.shares())
     assert [item for item, _ in shares] == list(scene.objects)
     total: Counter[str] = Counter()
@@ -49,9 +52,7 @@ def test_every_grasp_type_gets_all_repetitions_and_its_objects_even_shares(grasp
 
 @given(st.lists(st.sampled_from("abc"), min_size=1, max_size=12), st.integers(1, 20), st.integers(1, 20))
 def test_more_repetitions_go_on_where_those_of_the_scene_end(grasps: list[str], repetitions: int, more: int) -> None:
-    scene = Scene(
-        name="x", seed=1, taxonomy="own", objects=objects(grasps), subjects=(), repetitions=repetitions, effects=()
-    )
+    scene = scene_of(grasps, repetitions)
     fresh, both = scene.varied(more=more), scene.varied(repetitions + more)
     assert fresh == scene.varied(repetitions, more=more)
     for (_, old), (_, new), (_, whole) in zip(scene.shares(), fresh.shares(), both.shares(), strict=True):
