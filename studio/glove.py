@@ -276,13 +276,14 @@ def _naming(text: str, table: str, file: str) -> str:
         harness = parse_harness(text, "glove.toml")
         return harness.taxel_settings.calibration if table == "taxels" else harness.calibration
 
-    line = f'calibration = "{file}"'
-    heads = [found.end() for found in re.finditer(rf"^\[+{table}\]+[^\n]*\n", text, re.MULTILINE)]
-    tries = [text.replace(f'"{named(text)}"', f'"{file}"', 1)]
-    tries += [f"{text[:at]}{line}\n{text[at:]}" for at in heads]
+    line, named_before = f'calibration = "{file}"', r"""\bcalibration\s*=\s*("[^"\n]*"|'[^'\n]*')"""
+    places = [found.span() for found in re.finditer(named_before, text)]
+    heads = [found.end() for found in re.finditer(rf"^\[+\s*{table}\s*\]+[^\n]*", text, re.MULTILINE)]
+    tries = [text, *(text[:start] + line + text[end:] for start, end in places)]
+    tries += [f"{text[:at]}\n{line}{text[at:]}" for at in heads]
     tries.append(f"{text.rstrip()}\n\n[{table}]\n{line}\n")
     for one in tries:
         with suppress(ThenarError):
             if named(one) == file:
                 return one
-    raise SettingError(f"{file} is written: name it in glove.toml, in its table, with {line}")
+    raise SettingError(f"{file} is written: name it in the table {table} of glove.toml, with {line}")

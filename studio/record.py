@@ -171,7 +171,9 @@ class RecordPage:
         self._sitting, written = sitting, dict[str, object]()
         try:
             if done := sitting.lead(stop):
+                self._studio.publish("collecting", stage="writing")
                 written = self._write(sitting, done)
+                self._adapt(sitting.collection, done == len(sitting.trials))
         finally:
             self._studio.publish("collecting", written, stage="over")
             self._studio.changed()
@@ -179,19 +181,20 @@ class RecordPage:
     def _write(self, sitting: "Sitting", done: int) -> dict[str, object]:
         """Write the set of the accepted trials, and return its size and warnings for pages.
 
-        What was recorded for a build has its codes, on whichever page it was continued. Once it is complete, it adapts
-        the build, if it is the wearer's.
+        What was recorded for a build has its codes, on whichever page it was continued.
         """
-        collection, total = sitting.collection, len(sitting.trials)
-        build = self._project.build_of(collection.build)
+        build = self._project.build_of(sitting.collection.build)
         codings = None if build is None else build[1].manifest.codings
         grasp_set, report = import_recordings([sitting.recording], codings=codings)
         grasp_set.save(sitting.output)
-        if build is not None and done == total:
-            self._studio.queue("adapt", partial(self._wearer.adapt, collection.subject))
         warnings = [finding.message for finding in report.warnings]
         about = {"set": sitting.output.name, "size": str(grasp_set.size), "warnings": warnings}
-        return about | {"done": done, "total": total}
+        return about | {"done": done, "total": len(sitting.trials)}
+
+    def _adapt(self, collection: Collection, complete: bool) -> None:
+        """Adapt the build of everybody to what was recorded for it, once that is complete. Raises ThenarError."""
+        if complete and collection.build and collection.build == self._wearer.base()[1].manifest.checksum:
+            self._studio.queue("adapt", partial(self._wearer.adapt, collection.subject))
 
 
 class Sitting:
@@ -233,15 +236,17 @@ class Sitting:
         self.trials = {trial.number: trial for trial in planned(collection)}
         self._taxonomy = Taxonomy(collection.taxonomy, collection.types)
         self._sensors = GloveSensors(self._project)
-        # The frames of captured trials; the accepted trials; and of the last view the guide's step and the time.
+        # The frames of captured trials; the accepted trials, after the first view; and of the last view the guide's
+        # step and the time.
         self._captured = {} if journal is None else dict(journal.captured)
-        self._accepted = () if journal is None else journal.accepted
+        self._accepted: Sequence[int] | None = None
         self._shown, self._telling = (-1, 0), Lock()
 
     def lead(self, stop: Event) -> int:
         """Lead through the trials, and return how many are accepted now. Raises as `collect` does."""
         self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
-        self.tell()
+        # Those of the collection before are no longer shown.
+        self._studio.publish("trials", set="", trials=(), types=(), accuracy=None, command=self._command)
         return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
 
     def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
@@ -250,7 +255,7 @@ class Sitting:
         if step != guide.step:
             if guide.stage == "review" and guide.trial is not None:
                 self._captured[guide.trial.number] = guide.captured
-            if step < 0 or guide.accepted != self._accepted:
+            if guide.accepted != self._accepted:
                 self._accepted = guide.accepted
                 # Edits of trials that were undone are taken back.
                 self._studio.show_edits()
@@ -277,8 +282,10 @@ class Sitting:
         return self._studio.station.pressed()
 
     def tell(self) -> None:
-        """Show the accepted trials, and the accuracy in them, as they were edited."""
+        """Show the accepted trials, and the accuracy in them, as they were edited; before the first view, nothing."""
         with self._telling:
+            if self._accepted is None:
+                return
             trials, made = [self.trials[number] for number in self._accepted], dict[int, str]()
             with suppress(ThenarError, OSError):
                 edits = load_edits(self._project.edits)[0]
@@ -333,7 +340,7 @@ class Sitting:
 
         Raises SettingError for another trial or type, and as `change` does.
         """
-        if number not in self._accepted:
+        if self._accepted is None or number not in self._accepted:
             raise SettingError(f"trial {number} is not among those that were accepted")
         for grasp in filter(None, (self.trials[number].grasp, new)):
             if grasp not in self._taxonomy.types:

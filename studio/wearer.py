@@ -108,8 +108,9 @@ class WearerPage:
         """Adapt the build of everybody to a wearer's trials, put the result into use, and return its accuracy."""
         base, build = self.base()
         if wearer != self._project.state.wearer:
-            raise SettingError(f"{wearer} no longer wears the glove, so nothing is adapted")
-        paths = [*self._sets(wearer, build, report)]
+            raise SettingError(f"the wearer is now {self._project.state.wearer}: nothing is adapted to {wearer}")
+        # Reading says nothing of how long the adaptation takes.
+        paths = [*self._sets(wearer, build, lambda *_: report(0, 1))]
         if not paths:
             raise SettingError(f"no set holds only trials of {wearer}: record some")
         trials, output = self._project.recordings(paths)[0], self._project.new_path(wearer)

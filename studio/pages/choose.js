@@ -103,6 +103,7 @@ function certify() {
 
 function drawCurve({ points: named, of, enough }) {
   $("curve-panel").hidden = false;
+  const names = ({ sensors }) => sensors.map((sensor) => set.sensors[sensor].name).join(", ");
   const number = new Map(set.sensors.map(({ name }, sensor) => [name, sensor]));
   const found = named.map((point) => ({ ...point, sensors: point.sensors.map((name) => number.get(name)) }));
   const titles = ["Sensors", `${of}, %`, "Worth of the last, points", "After 2 own trials, %", ""];
@@ -113,7 +114,7 @@ function drawCurve({ points: named, of, enough }) {
       `${percent(mean)} [${percent(low)}, ${percent(high)}]`,
       worth ? `${points(worth.mean)} [${percent(worth.low)}, ${percent(worth.high)}]` : "–",
       adapted === null ? "–" : percent(adapted),
-      button(`Choose these ${number}`, () => choose(point.sensors)),
+      button(`Choose these ${number}`, () => choose(point.sensors), { title: names(point) }),
     ];
   }));
   $("points").children[found.findIndex(({ number }) => number === enough)]?.setAttribute("aria-current", "true");

@@ -46,9 +46,15 @@ const ask = openPage({
   work: ({ done, total, what }) => {
     const busy = done < total && what !== "reading";
     say($("busy"), busy ? "Edits are shown here when the work that goes on is finished." : "");
+    // A build may have been made anew.
+    if (what === "reading" && done === total && set && !set.why && request()[0]) look();
   },
   refused: ({ do: what }) => {
-    if (what === "errors") $("of").value = of;
+    if (what !== "errors") return;
+    // What a build read before is of other recordings.
+    const stale = reply?.numbering !== set.numbering && $("of").value !== "chosen";
+    $("of").value = stale ? "chosen" : of;
+    if (stale) look();
   },
   errors: (message) => {
     if (String(message.asked) === String(request()) && message.numbering === set.numbering) show(message);
@@ -234,7 +240,7 @@ function nextError(step) {
 }
 
 function edit(name) {
-  ask("edit", { name, trials: chosen(), id: set.numbering });
+  ask("edit", { name, trials: chosen(), id: reply.numbering });
 }
 
 $("of").addEventListener("change", look);

@@ -107,6 +107,7 @@ export class TrialMap {
     event.preventDefault();
     const [axis, step] = ARROWS[event.key];
     const order = [...this.#trials.keys()].sort((one, other) => this.#trials[one][axis] - this.#trials[other][axis]);
-    this.#point(order[order.indexOf(this.#pointed) + step] ?? order[0]);
+    const far = event.shiftKey ? Math.ceil(order.length / 20) : 1, at = order.indexOf(this.#pointed);
+    this.#point(order[at < 0 ? 0 : Math.min(Math.max(at + step * far, 0), order.length - 1)]);
   }
 }

@@ -56,7 +56,8 @@ const ask = openPage({
     say($("seen-heading"), `Trial ${trial}: ${grasp}, ${thing}`);
     if (drawn) hand ??= drawHand($("hand"), drawn);
     hand?.setClosed(closed);
-    $("hand").setAttribute("aria-label", `The hand: ${closed.filter(Boolean).length} of ${closed.length} switches closed`);
+    const { length } = drawn?.switches ?? [], count = closed.slice(0, length).filter(Boolean).length;
+    $("hand").setAttribute("aria-label", length ? `The hand: ${count} of ${length} switches closed` : "The hand");
     hand?.setTaxels(pressed);
     hand?.setPose(values);
   },
@@ -102,8 +103,8 @@ function show(state) {
     return;
   }
   if (before === "over") say($("refused"), "");
-  if (stage === "waiting") {
-    say($("prompt"), "Waiting for the glove …");
+  if (stage === "waiting" || stage === "writing") {
+    say($("prompt"), stage === "waiting" ? "Waiting for the glove …" : "Writing the set …");
     for (const id of ["thing", "standing", "place"]) say($(id), "");
     leadBy({});
     return;

@@ -494,6 +494,14 @@ def test_every_build_of_the_project_can_be_looked_at(
     cards(browser, min(len(misread(reply)), 24))
     assert said(browser, "#trials article li")
     assert browser.axe() == []
+    # What the build recognised before cannot be edited once other recordings are in use, which it cannot read.
+    replace(people, switches=people.switches[:, :1], switch_names=people.switch_names[:1]).save(folder / "set.grasps")
+    opened.changed()
+    browser.wait(lambda: browser.script("return document.getElementById('of').value") == "chosen")
+    browser.wait(lambda: browser.text("selection-heading") == "No trial selected")
+    people.save(folder / "set.grasps")
+    opened.changed()
+    use(browser, f"'{ids['more']}'", "build more")
     (folder / "few" / "tables.bin").write_bytes(b"")
     opened.changed()
     browser.wait(lambda: errors_of(opened, {"do": "errors", "id": ids["few"]})["topic"] == "refused")

@@ -13,8 +13,9 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.lines import BoardSender, LineServer
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.calibration import load_calibration, load_lines
-from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.taxels import TaxelCalibration
+from thenar.studio.glove import _naming
 from thenar.studio.studio import Studio
 
 from ..browser import Browser
@@ -239,6 +240,27 @@ def test_joints_are_calibrated_pose_by_pose(browser: Browser, studio: Start, fol
         assert (folder / "glove.toml").read_text().startswith("# Mine.\n")
         assert load_harness(folder / "glove.toml").calibration == str((folder / "joints.toml").resolve())
         browser.wait(lambda: browser.texts("#calibrate button") == ["Calibrate the joints anew"])
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        ("cyberglove", """[cyberglove]\nport = "/dev/ttyUSB0"\ncalibration = 'old.toml'\n"""),
+        ("cyberglove", '# calibration = "old.toml"\n[cyberglove]\nport = "/dev/ttyUSB0"\ncalibration = "old.toml"\n'),
+        ("cyberglove", "[ cyberglove ]\nport = '/dev/ttyUSB0'"),
+        ("cyberglove", """cyberglove = { port = "/dev/ttyUSB0", calibration = 'old.toml' }\n"""),
+        ("taxels", '[[stream]]\nport = "/dev/ttyACM0"\ntaxels = ["p1"]\n[taxels]'),
+        ("taxels", '[[stream]]\nport = "/dev/ttyACM0"\ntaxels = ["p1"]\n'),
+        ("stream", '[[ stream ]]\nport = "/dev/ttyACM0"\njoints = ["j1"]\n'),
+    ],
+)
+def test_a_calibration_is_named_where_the_file_has_room_for_it(table: str, text: str) -> None:
+    """However the file is written; all else stays."""
+    made = parse_harness(_naming(text, table, "new.toml"), "glove.toml")
+    found = made.taxel_settings.calibration if table == "taxels" else made.calibration
+    assert found == "new.toml"
+    before = parse_harness(text, "glove.toml")
+    assert (made.joint_names, made.taxel_names) == (before.joint_names, before.taxel_names)
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])

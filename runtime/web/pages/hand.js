@@ -319,7 +319,7 @@ export function drawHand(svg, hand, { onSwitch = null } = {}) {
   new ResizeObserver(arrange).observe(svg);
 
   return {
-    spots: new Map(glove.spots.map(({ name, group: spot }) => [name, spot])),
+    spots: new Map([glove, ...joints].flatMap(({ spots = [] }) => spots).map(({ name, group: spot }) => [name, spot])),
     setClosed: (bits, lost) => glove.setClosed(bits, lost),
     setTaxels: (values) => glove.setTaxels(values),
     setPose(values) {
