@@ -50,17 +50,8 @@ def folder(built: Path, tmp_path: Path) -> Path:
     return copytree(built, tmp_path / "build")
 
 
-def _silence(folder: Path, joints: int) -> None:
-    """Make the first joints say nothing, and seal everything again, as a faulty compiler would."""
-    tables = tables_from_bytes((folder / "tables.bin").read_bytes())
-    rows = tuple(rows * (number >= joints) for number, rows in enumerate(tables.joint_rows))
-    slopes = tuple(slope for slope in tables.lines if slope.joint >= joints)
-    whole = tuple(row.astype(np.int16) for row in rows)
-    silent = tables.changed(joint_rows=whole, joint_means=0 * tables.joint_means, further=slopes)
-    _seal(folder, silent)
-
-
 def _seal(folder: Path, tables: IntegerTables) -> None:
+    """Write tables into a build that says their checksum, as a faulty compiler would."""
     data = tables_to_bytes(tables)
     manifest = manifest_from_bytes((folder / "build.json").read_bytes())
     (folder / "tables.bin").write_bytes(data)
@@ -129,15 +120,11 @@ def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Pa
     assert found.recognised[0].integers > found.rows / 2
 
 
-def test_tables_that_are_not_the_ensembles_do_not_hold(folder: Path, grasp_set: GraspSet) -> None:
-    _silence(folder, 1)
-    found = verify(folder, grasp_set)
-    assert not found.holds
-    assert found.integer_difference > found.integer_bound
-
-
 def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
-    _silence(folder, 3)
+    # Joints that say nothing.
+    tables = tables_from_bytes((folder / "tables.bin").read_bytes())
+    rows = tuple(0 * row for row in tables.joint_rows)
+    _seal(folder, tables.changed(joint_rows=rows, joint_means=0 * tables.joint_means, further=()))
     found = verify(folder, grasp_set)
     assert found.changed
     assert found.covered_changed > 0
