@@ -243,6 +243,13 @@ def test_the_grid_starts_at_a_multiple_below_the_least_value(angles: list[float]
     assert joint.step == 0.5
 
 
+def test_codes_are_taken_as_they_are() -> None:
+    values = np.array([1.0, 255.0, 65535.0])
+    codes, joint, cost = code_joint("j", JointColumns(("j",), "raw", codes=True), values, rows(values))
+    assert codes.tolist() == joint.value(codes).tolist() == values.tolist()
+    assert cost.largest_error == 0
+
+
 def test_values_are_coded_by_a_calibration_when_there_is_one() -> None:
     entry = JointColumns(("j",), calibration=CalibrationPoints(100, 0.0, 200, -90.0))
     codes, _, cost = code_joint("j", entry, np.array([0.0, -45.2, -90.0]), np.arange(3))
