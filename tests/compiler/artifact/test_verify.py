@@ -177,15 +177,11 @@ def harness(grasp_set: GraspSet) -> Harness:
     return propose_harness(grasp_set.switch_names, "mcp23008")
 
 
-def _bytes(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-
-
 def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(
     grasp_set: GraspSet, harness: Harness, tmp_path: Path
 ) -> None:
     report = compile_build(grasp_set, tmp_path / "build", rounds=4, folds=0, harness=harness)
-    files = _bytes(tmp_path / "build")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "build").iterdir() if path.is_file()}
     assert set(files) == MEMBERS - {REPORT_NAME}
     assert report.manifest.scan_sha256 == hashlib.sha256(files[SCAN_NAME]).hexdigest()
     assert report.scan is not None
