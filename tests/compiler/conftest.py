@@ -1,6 +1,7 @@
 """Small sets of grasps that can be learnt, with switches and joints."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,16 @@ def make_set(
         subjects=np.array([f"S{row // types % subjects}" for row in range(rows)]),
     )
     return grasp_set if frames == 1 else grasp_set.rows(np.repeat(np.arange(rows), frames))
+
+
+def content(folder: Path) -> dict[str, str]:
+    """Return the texts of all files of a folder by their paths in it."""
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
+
+def names_of(count: int) -> list[str]:
+    """Return so many names of switches."""
+    return [f"s{number}" for number in range(count)]
 
 
 @pytest.fixture(scope="session")

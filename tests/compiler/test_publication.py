@@ -12,6 +12,8 @@ from thenar.compiler import publication
 from thenar.compiler.publication import check_folder, entries, publish_folder, sweep
 from thenar.drivers.errors import ThenarError
 
+from .conftest import content
+
 SCRIPT = Path(__file__).with_name("killed_publications.py")
 OURS = {"a", "b", "inner/c"}
 OLD = {"a": b"old", "b": b"old"}
@@ -28,10 +30,6 @@ def theirs(folder: Path) -> Collection[str]:
 
 def publish(files: dict[str, bytes], folder: Path) -> Path:
     return publish_folder(files, folder, theirs, ThenarError)
-
-
-def content(folder: Path) -> dict[str, str]:
-    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
 
 
 def names(folder: Path) -> list[str]:

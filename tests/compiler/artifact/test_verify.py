@@ -50,17 +50,8 @@ def folder(built: Path, tmp_path: Path) -> Path:
     return copytree(built, tmp_path / "build")
 
 
-def _silence(folder: Path, joints: int) -> None:
-    """Make the first joints say nothing, and seal everything again, as a faulty compiler would."""
-    tables = tables_from_bytes((folder / "tables.bin").read_bytes())
-    rows = tuple(rows * (number >= joints) for number, rows in enumerate(tables.joint_rows))
-    slopes = tuple(slope for slope in tables.lines if slope.joint >= joints)
-    whole = tuple(row.astype(np.int16) for row in rows)
-    silent = tables.changed(joint_rows=whole, joint_means=0 * tables.joint_means, further=slopes)
-    _seal(folder, silent)
-
-
 def _seal(folder: Path, tables: IntegerTables) -> None:
+    """Write tables into a build that says their checksum, as a faulty compiler would."""
     data = tables_to_bytes(tables)
     manifest = manifest_from_bytes((folder / "build.json").read_bytes())
     (folder / "tables.bin").write_bytes(data)
@@ -129,15 +120,11 @@ def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Pa
     assert found.recognised[0].integers > found.rows / 2
 
 
-def test_tables_that_are_not_the_ensembles_do_not_hold(folder: Path, grasp_set: GraspSet) -> None:
-    _silence(folder, 1)
-    found = verify(folder, grasp_set)
-    assert not found.holds
-    assert found.integer_difference > found.integer_bound
-
-
 def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
-    _silence(folder, 3)
+    # Joints that say nothing.
+    tables = tables_from_bytes((folder / "tables.bin").read_bytes())
+    rows = tuple(0 * row for row in tables.joint_rows)
+    _seal(folder, tables.changed(joint_rows=rows, joint_means=0 * tables.joint_means, further=()))
     found = verify(folder, grasp_set)
     assert found.changed
     assert found.covered_changed > 0
@@ -190,15 +177,11 @@ def harness(grasp_set: GraspSet) -> Harness:
     return propose_harness(grasp_set.switch_names, "mcp23008")
 
 
-def _bytes(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-
-
 def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(
     grasp_set: GraspSet, harness: Harness, tmp_path: Path
 ) -> None:
     report = compile_build(grasp_set, tmp_path / "build", rounds=4, folds=0, harness=harness)
-    files = _bytes(tmp_path / "build")
+    files = {path.name: path.read_bytes() for path in (tmp_path / "build").iterdir() if path.is_file()}
     assert set(files) == MEMBERS - {REPORT_NAME}
     assert report.manifest.scan_sha256 == hashlib.sha256(files[SCAN_NAME]).hexdigest()
     assert report.scan is not None

@@ -74,6 +74,12 @@ def test_folds_and_training_orders_are_wekas(weka_data: Path, name: str, mode: s
         assert np.array_equal(fold.train, orders[number][orders[number] >= 0])
 
 
+def covers_once(folds: list[Fold], n: int) -> bool:
+    tested = np.sort(np.concatenate([fold.test for fold in folds]))
+    whole = all(np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(n)) for fold in folds)
+    return whole and np.array_equal(tested, np.arange(n))
+
+
 labelled = st.lists(st.integers(0, 5), min_size=2, max_size=80)
 
 
@@ -81,10 +87,7 @@ labelled = st.lists(st.integers(0, 5), min_size=2, max_size=80)
 def test_every_row_is_tested_once_and_never_where_it_was_trained(labels: list[int], data: st.DataObject) -> None:
     n_folds = data.draw(st.integers(2, len(labels)))
     folds = weka_folds(labels, n_folds, data.draw(st.integers(0, 1000)))
-    everything = np.arange(len(labels))
-    assert np.array_equal(np.sort(np.concatenate([fold.test for fold in folds])), everything)
-    for fold in folds:
-        assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), everything)
+    assert covers_once(folds, len(labels))
 
 
 @pytest.mark.parametrize(
@@ -94,12 +97,6 @@ def test_every_row_is_tested_once_and_never_where_it_was_trained(labels: list[in
 def test_a_cut_that_leaves_nothing_is_refused_with_the_reason(n_rows: int, n_folds: int, reason: str) -> None:
     with pytest.raises(EvaluationError, match=reason):
         weka_folds([0] * n_rows, n_folds, 1)
-
-
-def covers_once(folds: list[Fold], n: int) -> bool:
-    tested = np.sort(np.concatenate([fold.test for fold in folds]))
-    whole = all(np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(n)) for fold in folds)
-    return whole and np.array_equal(tested, np.arange(n))
 
 
 @given(st.lists(st.sampled_from("ABCDE"), min_size=2, max_size=40).filter(lambda names: len(set(names)) > 1))

@@ -7,7 +7,6 @@ import pytest
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.evaluation.study import Study, evaluate
-from thenar.compiler.evaluation.tables import RateTable
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
 
@@ -33,12 +32,8 @@ def aml(aml_table: Path) -> GraspSet:
 
 def rates(study: Study, name: str, row: str, protocol: str = "nested") -> tuple[Rate, ...]:
     (table,) = (t for t in study.tables if (t.name, t.protocol) == (name, protocol))
-    (found,) = (line for line in _rows(table) if line[0] == row)
-    return found[1]
-
-
-def _rows(table: RateTable) -> list[tuple[str, tuple[Rate, ...]]]:
-    return [(row.name, tuple(cell.rate for cell in row.cells)) for row in table.rows]
+    (found,) = (line for line in table.rows if line.name == row)
+    return tuple(cell.rate for cell in found.cells)
 
 
 def test_the_icubs_joints_tell_eleven_objects_apart_and_touch_adds_to_them(icub_study: Study) -> None:

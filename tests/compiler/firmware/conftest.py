@@ -51,6 +51,12 @@ def make_tables(
 
 
 @pytest.fixture(scope="session")
+def build() -> Build:
+    tables = make_tables()
+    return Build(describe(tables), tables)
+
+
+@pytest.fixture(scope="session")
 def cores() -> Any:
     """Return the emulated cores of tests/qemu by the names of their targets."""
     for name in ("arm-none-eabi-gcc", "qemu-system-arm", "riscv64-unknown-elf-gcc", "qemu-system-riscv32"):

@@ -13,15 +13,10 @@ from thenar.runtime.build import Build
 
 from ...conftest import tool
 from ...tables import describe
+from ..conftest import content
 from .conftest import make_tables
 
 COMPILERS = {"avr": "avr-gcc", "host": "gcc"}
-
-
-@pytest.fixture(scope="session")
-def build() -> Build:
-    tables = make_tables()
-    return Build(describe(tables), tables)
 
 
 def classifier(build: Build, platform: str) -> dict[str, str]:
@@ -88,10 +83,6 @@ def test_a_build_too_large_for_an_uno_gets_a_larger_part() -> None:
 
 OLD = {"thenar_glove.c": "old\n", "examples/one/one.ino": "old\n", "gone.h": "old\n"}
 NEW = {"thenar_glove.c": "new\n", "examples/one/one.ino": "new\n", "Makefile": "all:\n"}
-
-
-def content(folder: Path) -> dict[str, str]:
-    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.fixture

@@ -7,17 +7,9 @@ from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 
 from ...conftest import tool
-from ...tables import describe
-from .conftest import make_tables
 
 # Compilers and simulators of whole programs: minutes, together.
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture
-def build() -> Build:
-    tables = make_tables()
-    return Build(describe(tables), tables)
 
 
 def measured(build: Build, platform: str) -> Measured:

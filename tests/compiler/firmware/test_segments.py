@@ -14,8 +14,6 @@ from thenar.compiler.firmware.generate import firmware_files
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.package import Package
 from thenar.compiler.firmware.tools import call, workshop
-from thenar.runtime.manifest import Manifest
-from thenar.runtime.model.integers import IntegerTables
 from thenar.runtime.segmenting.model import SegmentModel
 
 from ...tables import describe
@@ -114,14 +112,10 @@ def test_the_segment_decoder_takes_the_documented_avr_cycles_and_memory(runs: An
         assert run.stack <= 44
 
 
-def _learnt(tables: IntegerTables) -> Manifest:
-    return replace(describe(tables), segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
-
-
 @pytest.mark.parametrize("target", sorted(TARGETS))
 def test_firmware_of_builds_with_segment_costs_includes_the_decoder(avr: None, target: str) -> None:
     tables = make_tables()
-    manifest = _learnt(tables)
+    manifest = replace(describe(tables), segments=SegmentModel.usual(tables.n_classes, False, tables.scale))
     files = firmware_files(tables, manifest, target)
     plain = firmware_files(tables, describe(tables), target)
     if target == "micropython":

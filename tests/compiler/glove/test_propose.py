@@ -7,14 +7,11 @@ from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import GloveWiring, MuxChannel
-from thenar.runtime.scanning.ports import ports_of, whole_scan
-from thenar.runtime.scanning.timing import scan_us
+from thenar.runtime.scanning.ports import whole_scan
+
+from ..conftest import names_of
 
 KINDS = sorted(expanders())
-
-
-def names_of(count: int) -> list[str]:
-    return [f"s{number}" for number in range(count)]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -74,13 +71,6 @@ def test_the_first_names_are_on_the_first_chips_and_before_the_mux() -> None:
     assert list(bus.chips[0].pins.values()) == names_of(14)
     assert list(bus.chips[11].pins) == ["GPA0", "GPA1", "GPA2", "GPA3", "GPA4", "GPA5"]
     assert bus.clock_hz == 400_000
-
-
-def test_twenty_two_switches_take_two_chips_and_two_transactions() -> None:
-    harness = propose_harness(names_of(22))
-    time = scan_us(whole_scan(harness, names_of(22)), harness)
-    assert time.us == pytest.approx(2 * 121.3)
-    assert len(ports_of(harness, {name: number for number, name in enumerate(names_of(22))}, {})) == 2
 
 
 def test_the_clock_is_one_that_the_chip_can_follow() -> None:

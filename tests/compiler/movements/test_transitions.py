@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.movements.transitions import FREQUENT, Transitions
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.errors import FormatError
 
 from .conftest import make_movements
@@ -38,7 +37,8 @@ def test_changes_count_once_and_shares_are_per_type(sequences: list[list[str]]) 
 def test_nothing_held_is_passed_over_and_what_is_written_is_read(tmp_path: Path) -> None:
     grasp_set = make_movements("A", 2)
     found = Transitions.of_set(grasp_set)
-    held = [grasp_set.grasps[rows[0]] for rows in np.split(np.arange(len(grasp_set)), _starts(grasp_set))]
+    starts = np.flatnonzero(grasp_set.grasps[1:] != grasp_set.grasps[:-1]) + 1
+    held = [grasp_set.grasps[rows[0]] for rows in np.split(np.arange(len(grasp_set)), starts)]
     held = [name for name in held if name != "none"]
     assert found.counts.sum() == len(held) - 1 == 5
     for one, other in pairwise(held):
@@ -51,10 +51,6 @@ def test_nothing_held_is_passed_over_and_what_is_written_is_read(tmp_path: Path)
         path.write_bytes(wrong)
         with pytest.raises(FormatError, match=r"graph\.json is not a transitions file"):
             Transitions.load(path)
-
-
-def _starts(grasp_set: GraspSet) -> np.ndarray:
-    return np.flatnonzero(grasp_set.grasps[1:] != grasp_set.grasps[:-1]) + 1
 
 
 def test_a_report_lists_changes_where_the_recordings_are_whole_movements(tmp_path: Path) -> None:

@@ -14,11 +14,9 @@ from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
 
+from ..conftest import names_of
+
 sizes = st.integers(1, 200)
-
-
-def names_of(count: int) -> list[str]:
-    return [f"s{number}" for number in range(count)]
 
 
 def test_a_port_that_is_read_anyway_costs_nothing_further() -> None:

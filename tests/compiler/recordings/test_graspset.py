@@ -138,12 +138,6 @@ def test_format_2_is_written_only_where_needed(small: GraspSet, tmp_path: Path) 
     assert formats == [1, 2, 2, 2]
 
 
-def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:
-    joint = Joint("index", "deg", 117, 0.0, 217, -90.0)
-    assert float(joint.value(117)) == 0.0
-    assert joint.value([117, 167, 217]).tolist() == [0.0, -45.0, -90.0]
-
-
 @pytest.mark.parametrize(
     ("points", "reason"),
     [
@@ -175,8 +169,3 @@ def test_a_name_that_a_file_format_would_lose_is_refused(name: str, reason: str)
 
 def test_ordinary_names_of_any_language_pass() -> None:
     check_names("column", ["thumb 1", "親指", "a,b", "it's", "50 %"])
-
-
-def test_equal_names_are_refused() -> None:
-    with pytest.raises(RecordingError, match="switch 'a' occurs twice"):
-        check_names("switch", ["a", "b", "a"])

@@ -180,12 +180,8 @@ def test_oddities_are_warnings_with_the_users_rows() -> None:
     assert (finding.kind, finding.rows) == ("frames shared by subjects", (2, 3, 5, 6))
 
 
-def imported(path: Path, columns: str) -> tuple[GraspSet, ImportReport]:
-    return import_file(path, EXAMPLES / columns)
-
-
 def test_the_icub_recordings_are_read_as_their_readme_describes_them(icub_table: Path) -> None:
-    grasp_set, report = imported(icub_table, "icub.toml")
+    grasp_set, report = import_file(icub_table, EXAMPLES / "icub.toml")
     assert grasp_set.switches.shape == (230, 60)
     assert grasp_set.joint_names == tuple(f"enc{number}" for number in range(7, 16))
     assert (report.grasp_types, report.subjects, report.objects) == (11, 1, 1)

@@ -17,7 +17,6 @@ from thenar.compiler.recordings.summary import (
     summarise,
 )
 from thenar.compiler.recordings.taxonomy import own
-from thenar.runtime.recording.reader import Oddity
 
 from .conftest import grasp_sets
 
@@ -80,12 +79,8 @@ def test_taxels_have_ranges_and_are_touched_above_their_noise(small: GraspSet) -
     assert touched[:, -2:].tolist() == [[False, False], [True, False]] * 3
 
 
-def by_kind(grasp_set: GraspSet) -> dict[str, Oddity]:
-    return {finding.kind: finding for finding in find_oddities(grasp_set, np.arange(10, 10 + len(grasp_set)))}
-
-
 def test_every_oddity_is_counted_and_named(small: GraspSet) -> None:
-    found = by_kind(small)
+    found = {finding.kind: finding for finding in find_oddities(small, np.arange(10, 10 + len(small)))}
     assert found["constant switches"].columns == ("dead",)
     assert found["constant joints"].columns == ("wrist",)
     assert found["duplicate switches"].columns == ("palm copy",)

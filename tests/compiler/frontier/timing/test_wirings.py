@@ -23,11 +23,9 @@ from thenar.runtime.harness.wiring import BoardWiring, GloveWiring, Harness, Str
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.timing import row_us, scan_us
 
+from ...conftest import names_of
+
 sizes = st.integers(1, 200)
-
-
-def names_of(count: int) -> list[str]:
-    return [f"s{number}" for number in range(count)]
 
 
 @given(sizes, st.sampled_from([(), SENSORS_18, SENSORS_22, ("bend_1",)]))

@@ -92,14 +92,6 @@ def test_of_switches_as_good_those_whose_ports_are_needed_anyway_stay() -> None:
     assert set(elimination_order(learning, PortCosts((0, 1, 1), (50.0, 50.0)))[:2]) == {1, 2}
 
 
-def noisy(seed: int, joints: int, switches: int = 11) -> Samples:
-    random = np.random.default_rng(seed)
-    labels = np.arange(160) % 5
-    bits = (random.random((5, switches)) < 0.4)[labels] ^ (random.random((160, switches)) < 0.15)
-    codes = (50 * labels[:, np.newaxis] + random.integers(0, 200, (160, joints))).astype(np.uint16)
-    return learning_of(bits, labels, codes)
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 9))
 def test_a_joint_becomes_bits_that_rise_one_after_another(seed: int, n: int, highest: int) -> None:
     codes = np.random.default_rng(seed).integers(0, highest + 1, (n, 2)).astype(np.uint16)

@@ -37,12 +37,6 @@ def test_one_tree_answers_for_every_s_as_the_papers_pruned_tree_does(samples: Sa
     assert METHODS["id3"].chooser(samples)(s) == grow_id3(samples.switches, samples.labels, min_samples=s).inputs
 
 
-@given(learnings(), st.integers(0, 11))
-def test_no_more_switches_are_kept_than_asked_for(samples: Samples, most: int) -> None:
-    kept = METHODS["id3-cost"].chooser(samples)(most)
-    assert len(set(kept)) == len(kept) <= most
-
-
 @st.composite
 def data(draw: st.DrawFn) -> tuple[Bits, Labels]:
     random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
