@@ -171,7 +171,6 @@ class RecordPage:
         self._sitting, written = sitting, dict[str, object]()
         try:
             if done := sitting.lead(stop):
-                self._studio.publish("collecting", stage="writing")
                 written = self._write(sitting, done)
                 self._adapt(sitting.collection, done == len(sitting.trials))
         finally:
@@ -247,7 +246,9 @@ class Sitting:
         self._studio.publish("collecting", stage="waiting", adapts=self._adapts)
         # Those of the collection before are no longer shown.
         self._studio.publish("trials", set="", trials=(), types=(), accuracy=None, command=self._command)
-        return collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
+        done = collect(self._project.harness, self.collection, self.recording, self._journal, self._view, stop)
+        self._studio.publish("collecting", stage="writing", adapts=self._adapts)
+        return done
 
     def _view(self, guide: CollectionGuide, devices: Sequence[DeviceHealth]) -> list[Key]:
         """Show the guide's state ten times a second and at every change; return the keys pressed."""

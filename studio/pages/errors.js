@@ -46,8 +46,6 @@ const ask = openPage({
   work: ({ done, total, what }) => {
     const busy = done < total && what !== "reading";
     say($("busy"), busy ? "Edits are shown here when the work that goes on is finished." : "");
-    // A build may have been made anew.
-    if (what === "reading" && done === total && set && !set.why && request()[0]) look();
   },
   refused: ({ do: what }) => {
     if (what !== "errors") return;

@@ -249,9 +249,9 @@ def test_joints_are_calibrated_pose_by_pose(browser: Browser, studio: Start, fol
         ("cyberglove", '# calibration = "old.toml"\n[cyberglove]\nport = "/dev/ttyUSB0"\ncalibration = "old.toml"\n'),
         ("cyberglove", "[ cyberglove ]\nport = '/dev/ttyUSB0'"),
         ("cyberglove", """cyberglove = { port = "/dev/ttyUSB0", calibration = 'old.toml' }\n"""),
-        ("taxels", '[[stream]]\nport = "/dev/ttyACM0"\ntaxels = ["p1"]\n[taxels]'),
-        ("taxels", '[[stream]]\nport = "/dev/ttyACM0"\ntaxels = ["p1"]\n'),
-        ("stream", '[[ stream ]]\nport = "/dev/ttyACM0"\njoints = ["j1"]\n'),
+        ("taxels", '[[stream]]\nport = "/dev/ttyACM0"\ntaxels = { p1 = [0, 1023] }\n[taxels]'),
+        ("taxels", '[[stream]]\nport = "/dev/ttyACM0"\ntaxels = { p1 = [0, 1023] }\n'),
+        ("stream", '[[ stream ]]\nport = "/dev/ttyACM0"\njoints = { j1 = [0, 254] }\n'),
     ],
 )
 def test_a_calibration_is_named_where_the_file_has_room_for_it(table: str, text: str) -> None:
@@ -260,7 +260,7 @@ def test_a_calibration_is_named_where_the_file_has_room_for_it(table: str, text:
     found = made.taxel_settings.calibration if table == "taxels" else made.calibration
     assert found == "new.toml"
     before = parse_harness(text, "glove.toml")
-    assert (made.joint_names, made.taxel_names) == (before.joint_names, before.taxel_names)
+    assert (made.sensor_names, made.taxel_names) == (before.sensor_names, before.taxel_names)
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1400, "light")])

@@ -212,7 +212,7 @@ def test_the_countdown_waits_while_the_glove_is_away_and_a_restart_continues(
         browser.wait(lambda: browser.texts("#recordings button"))
         assert browser.texts("#recordings button") == ["Continue Anna.mcap of Anna: 1 of 3 trials are done"]
         wired = (folder / "glove.toml").read_text()
-        (folder / "glove.toml").write_text(wired.replace('"j1"', '"j1", "j2"'))
+        (folder / "glove.toml").write_text(wired.replace("j1 = [0, 254]", "j1 = [0, 254], j2 = [0, 254]"))
         browser.driver.find_element(By.CSS_SELECTOR, "#recordings button").click()
         browser.wait(lambda: "was begun with different sensors" in browser.text("refused"))
         assert browser.texts("#strip button") == []
