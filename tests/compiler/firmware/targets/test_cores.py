@@ -11,6 +11,7 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import extreme_frames, joined, random_frames
 from thenar.compiler.firmware.words import numbered
 from thenar.firmware_templates.rendering import file_text
+from thenar.runtime.model.quantise import in_bytes
 from thenar.runtime.model.terms.line import Line
 
 from ..conftest import make_tables
@@ -34,6 +35,7 @@ def test_a_frame_takes_few_instructions(cores: Any, part: str, lines: bool) -> N
             joint_rows=tuple(each[:1] for each in tables.joint_rows),
             further=tuple(Line(joint, 3, 240, rows, 0) for joint in range(16)),
         )
+    tables = in_bytes(tables)
     layout, frames = Layout(tables), joined(extreme_frames(tables), random_frames(tables, 1000, 1))
     sent = layout.frame_bytes(frames.bits, frames.codes)
     answers = cores[part].run(Library("hand", numbered(tables), layout).files, "hand", layout, sent)
