@@ -85,11 +85,11 @@ def _timed() -> tuple[str, ...]:
 )
 @click.option(
     "--adapt",
-    "own",
+    "own_trials",
     type=click.IntRange(0, 1000),
     default=0,
     metavar="N",
-    help="Evaluate the points for new subjects after N own trials of each type, too.",
+    help="Also print the accuracy of new subjects before and after N own trials of each type.",
 )
 @jobs_option()
 @json_flag
@@ -195,9 +195,9 @@ def print_frontier(frontier: "Frontier") -> None:
             *(f"{point.flash:,}", f"{point.ram:,}"),
             style="bold" if point.number == frontier.picked else "",
         )
-    console, folds, luck = out(), words.folds_of(frontier), words.luck_of(frontier)
+    console, folds, remarks = out(), words.folds_of(frontier), words.remarks_on_rates(frontier)
     console.print(grid)
-    console.print(Text(f"{folds}. Accuracy in % with 95 % intervals. {luck} Flash, RAM: bytes.", "dim"))
+    console.print(Text(f"{folds}. Accuracy in % with 95 % intervals. {remarks} Flash, RAM: bytes.", "dim"))
     for missing in frontier.skipped:
         console.print(Text(missing, "yellow"))
     console.print()

@@ -39,10 +39,10 @@ def related_joints(tables: ScoreTables, learnt: Samples) -> tuple[int, ...]:
 
 
 def hits_of(recogniser: Recogniser, samples: Samples, tries: Sequence[Try] = TRIES) -> list[Hits]:
-    """Return the effect of each try on each person in `samples`, with all inputs, whom the recogniser has not seen, by
-    integer tables.
+    """Return how many trials of each person in `samples`, with all inputs, integer tables recognise after each try.
 
-    A person's first trials of each type adapt; those that no try needs are tested. A person without such is left out.
+    Only people whom the recogniser has not seen count. A person's first trials of each type adapt; those that no try
+    needs are tested. A person without such trials is left out.
     """
     read = recogniser.read(samples).without_none()
     tables, recipe = collapse(recogniser.model, read.n_switches), recogniser.recipe

@@ -156,10 +156,10 @@ def standing(guide: CollectionGuide) -> str:
 
 
 def meet(sources: Sources, switches: int, stop: Event, ends: str) -> None:
-    """Wait until every device is there and a switch (of this number), a taxel or the joints are read, or `stop` is set.
+    """Wait until every device is connected and a switch, a taxel or the joints were read, or until `stop` is set.
 
-    Raises DeviceError or SettingError for a missing device, DeviceError if all are silent: a port may open even when
-    nothing is connected to its other end. `ends` says what then is not done.
+    There are `switches` switches. Raises DeviceError or SettingError for a missing device, DeviceError if all are
+    silent: a port may open even when nothing is connected to its other end. The error ends with `ends`.
     """
     end = now_us() + _PATIENCE_US
     read = False

@@ -109,7 +109,7 @@ class ErrorsPage:
         studio.add(requests | dict.fromkeys(("edit", "undo"), self._edit), self.read)
 
     def read(self, report: Report) -> None:
-        """Forget how builds recognised what was read before, and read the one in use, for which no page then waits."""
+        """Forget the earlier readings of builds, and read the build in use, so that no page waits for it."""
         self._readings = {}
         for member, path in self._project.members("build").items():
             if path.name == self._project.state.build:

@@ -276,8 +276,8 @@ def _naming(text: str, table: str, file: str) -> str:
         harness = parse_harness(text, "glove.toml")
         return harness.taxel_settings.calibration if table == "taxels" else harness.calibration
 
-    line, named_before = f'calibration = "{file}"', r"""\bcalibration\s*=\s*("[^"\n]*"|'[^'\n]*')"""
-    places = [found.span() for found in re.finditer(named_before, text)]
+    line = f'calibration = "{file}"'
+    places = [found.span() for found in re.finditer(r"""\bcalibration\s*=\s*("[^"\n]*"|'[^'\n]*')""", text)]
     heads = [found.end() for found in re.finditer(rf"^\[+\s*{table}\s*\]+[^\n]*", text, re.MULTILINE)]
     tries = [text, *(text[:start] + line + text[end:] for start, end in places)]
     tries += [f"{text[:at]}\n{line}{text[at:]}" for at in heads]

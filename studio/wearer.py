@@ -107,8 +107,8 @@ class WearerPage:
     def adapt(self, wearer: str, report: Report) -> dict[str, object]:
         """Adapt the build of everybody to a wearer's trials, put the result into use, and return its accuracy."""
         base, build = self.base()
-        if wearer != self._project.state.wearer:
-            raise SettingError(f"the wearer is now {self._project.state.wearer}: nothing is adapted to {wearer}")
+        if wearer != (now := self._project.state.wearer):
+            raise SettingError(f"the wearer is now {now}, so the build was not adapted to {wearer}")
         # Reading says nothing of how long the adaptation takes.
         paths = [*self._sets(wearer, build, lambda *_: report(0, 1))]
         if not paths:

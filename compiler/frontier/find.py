@@ -1,6 +1,7 @@
 """Find a frontier from recordings: screen everything, evaluate candidates near the front fully, assemble the result."""
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -71,7 +72,7 @@ def find_frontier(
     budget_us: float | None = None,
     rate: float | None = None,
     joint_us: float | None = None,
-    own: int = 0,
+    own_trials: int = 0,
     limits: Limits | None = None,
     jobs: int = -1,
     report: Report | None = None,
@@ -104,8 +105,8 @@ def find_frontier(
         Time of reading all joints, in microseconds. By default it is that of a CyberGlove's record, as measured for
         the harness, else by the vendor's formula; of other joints it is left out of every frame, and a sentence of
         `skipped` says so.
-    own : int
-        Evaluate the points for new subjects after this number of own trials of each type, too; 0: not.
+    own_trials : int
+        Also evaluate the points for new subjects, before and after this number of own trials of each type; 0: do not.
     limits : Limits, optional
         The sensors to keep or to leave out, and prices, for a search among sensors.
     jobs : int
@@ -140,15 +141,16 @@ def find_frontier(
     if limits is not None and not search.by_sensors:
         raise FrontierError("``have``, ``never`` and ``prices`` are for ``sensors`` or ``price``: add one of these")
     cuts = Cuts.of(samples, search)
-    if own and not cuts.subjects:
+    if own_trials and not cuts.subjects:
         raise FrontierError("own trials are those of a subject who is left out: record two or more subjects")
     types = samples.labels[np.unique(cuts.trials, return_index=True)[1]]
-    if own >= np.unique([*zip(cuts.people.tolist(), types.tolist(), strict=True)], axis=0, return_counts=True)[1].max():
-        raise FrontierError(f"nobody has more than {own} trials of a type: adapt to fewer")
+    trials_of_a_type = Counter(zip(cuts.people.tolist(), types.tolist(), strict=True))
+    if own_trials >= max(trials_of_a_type.values()):
+        raise FrontierError(f"nobody has more than {own_trials} trials of a type: adapt to fewer")
     ports = ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
     created = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
-        cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS + bool(own), jobs=jobs)
+        cache = Cache(store, report or (lambda _done, _total: None), _ROUNDS + bool(own_trials), jobs=jobs)
         with _remove_created_on_error(created, store):
             equipment = equipment_for(grasp_set, harness, target, cache, joint_us)
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache, limits)
@@ -160,7 +162,7 @@ def find_frontier(
             if rough is not None:
                 rough(early)
 
-        frontier = _found(survey, own, show_rough)
+        frontier = _found(survey, own_trials, show_rough)
         frontier = changed_to(
             frontier,
             skipped=(*untimed, *frontier.skipped),
@@ -223,7 +225,7 @@ def kept_entries(folder: Path) -> list[str]:
     return [path for path in there if path not in _DOCUMENTS]
 
 
-def _found(survey: Survey, own: int, rough: Callable[[Frontier], None]) -> Frontier:
+def _found(survey: Survey, own_trials: int, rough: Callable[[Frontier], None]) -> Frontier:
     """Return the frontier of a survey, without a picked point; call `rough` with what the first screening tried."""
     search, equipment, n_switches = survey.search, survey.equipment, survey.samples.n_switches
     screened = screen(survey)
@@ -262,7 +264,7 @@ def _found(survey: Survey, own: int, rough: Callable[[Frontier], None]) -> Front
         never=() if survey.limits is None else survey.limits.never,
         price=search.price,
         prices={} if survey.limits is None else dict(survey.limits.prices),
-        own=own,
+        own_trials=own_trials,
         skipped=(*claimed, *notes),
     )
     rough(frontier)
@@ -281,7 +283,7 @@ def _found(survey: Survey, own: int, rough: Callable[[Frontier], None]) -> Front
     kept = list(dict.fromkeys(design for front in best_designs(designs) for design in front))
     times = survey.measured(design.tables.content for design in kept)
     kept = [replace(design, measured=times.get(design.tables.content)) for design in kept]
-    adapted = survey.adapted([design.tables.recipe for design in kept], own) if own else {}
+    adapted = survey.adapted([design.tables.recipe for design in kept], own_trials) if own_trials else {}
     return changed_to(
         frontier,
         combinations=len(designs) + len(tried),

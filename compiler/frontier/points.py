@@ -99,7 +99,7 @@ class FrontierPoint(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     luck        the optimism of picking the best of all that was tried (`evaluation.rates.Draws`)
     frames      the rate of single frames, uncorrected (None: a trial has one frame)
     other_rate  the other of the two, uncorrected (None: only one subject)
-    adapted     the rates of new subjects before and after a frontier's `own` trials a type, on their further trials,
+    adapted     the rates of new subjects before and after their `own_trials` of each type, on their other trials,
                 uncorrected (None: not asked for)
     scan        reading the switches; transfer: the joints
     frame       max(scan, transfer) + classify: the two use separate lines
@@ -170,7 +170,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     n_levels  most levels of the n_taxels to choose from, in addition to the switches
     picked   number of the point selected by the given budget or rate; None if neither was given
     have, never, price, prices  the limits of the sensors, if these were chosen
-    own      number of own trials of each type to which a new subject's build is adapted; 0: none is
+    own_trials  the number of trials of each type to which a new subject's model is adapted; 0: it is not
     skipped  sentences: measurements that were not possible here, and options that were left out
     """
 
@@ -202,7 +202,7 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     never: tuple[Name, ...] = ()
     price: Value | None = None
     prices: dict[Name, Value] = {}
-    own: Count = 0
+    own_trials: Count = 0
 
     @property
     def trainers(self) -> tuple[str, ...]:

@@ -266,12 +266,12 @@ class Survey:
         }
         return self._ask(fit_stages, calls)
 
-    def adapted(self, recipes: Iterable[Recipe], own: int) -> dict[Recipe, tuple[Rate, Rate]]:
-        """Return the accuracy of the subjects left out before and after `own` trials a type of theirs, for tabled
-        recipes. One of the subjects has more trials of a type.
+    def adapted(self, recipes: Iterable[Recipe], own_trials: int) -> dict[Recipe, tuple[Rate, Rate]]:
+        """Return the accuracy of the subjects left out before and after this number of their trials of each type, for
+        tabled recipes. One subject must have more trials of a type.
         """
         # Without own trials no strength counts.
-        tries = (0, STRENGTH), *((own, strength) for strength in STRENGTHS)
+        tries = (0, STRENGTH), *((own_trials, strength) for strength in STRENGTHS)
         calls = {
             (recipe, fold): (
                 self.samples,

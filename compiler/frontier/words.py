@@ -143,13 +143,13 @@ def folds_of(frontier: Frontier) -> str:
     return f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
 
 
-def luck_of(frontier: Frontier) -> str:
-    """Return sentences on which rates are corrected for luck, and which trials adapt."""
+def remarks_on_rates(frontier: Frontier) -> str:
+    """Return sentences on the correction of rates for luck, and on own trials."""
     adapting = (
-        f" The first {counted(frontier.own, 'trial')} of each type of a new subject adapt the model; its further ones "
-        "are tested before and after that, uncorrected."
+        f" The first {counted(frontier.own_trials, 'trial')} of each type of a left-out subject adapt the model. The "
+        "rates before and after that are of the subject's other trials, and are not corrected."
     )
-    return LUCK + (adapting if frontier.own else "")
+    return LUCK + (adapting if frontier.own_trials else "")
 
 
 def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | None]]:
@@ -161,9 +161,9 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[FrontierPoint], Rate | N
         found[f"{frontier.by}, frames"] = lambda point: point.frames
     if frontier.other is not None:
         found[frontier.other] = lambda point: point.other_rate
-    if frontier.own:
+    if frontier.own_trials:
         found["before own trials"] = lambda point: point.adapted and point.adapted[0]
-        found[f"after {frontier.own} a type"] = lambda point: point.adapted and point.adapted[1]
+        found[f"after {counted(frontier.own_trials, 'own trial')}"] = lambda point: point.adapted and point.adapted[1]
     return found
 
 
@@ -182,8 +182,8 @@ def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of names, and a line for each point.
 
     The columns of trainer and settings are only there if a point's are not the defaults. Rates are in 0..1, times in
-    microseconds; all rates but `rate` may be empty. `fronts`, `switches` and `settings` are lists in a
-    cell, separated by semicolons; names with a semicolon or a quote are quoted as in CSV.
+    microseconds; all rates but `rate` may be empty. `fronts`, `switches` and `settings` are lists within a cell,
+    separated by semicolons; names with a semicolon or a quote are quoted as in CSV.
     """
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
@@ -202,8 +202,8 @@ def _cells(point: FrontierPoint) -> dict[str, object]:
     row |= {"inputs": setting.inputs, "method": placement.method, "parameter": placement.parameter}
     row |= {"rounds": setting.rounds, "width": setting.width, "wiring": setting.wiring, "clock_hz": setting.clock_hz}
     before, after = point.adapted or (None, None)
-    kinds = {"rate": point.rate, "frames": point.frames, "other_rate": point.other_rate, "own_before": before}
-    for name, rate in (kinds | {"own_after": after}).items():
+    kinds = {"rate": point.rate, "frames": point.frames, "other_rate": point.other_rate}
+    for name, rate in (kinds | {"before_adaptation": before, "after_adaptation": after}).items():
         numbers = ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
         row |= zip((f"{name}_of", name, f"{name}_low", f"{name}_high"), numbers, strict=True)
         if name == "rate":

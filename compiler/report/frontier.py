@@ -8,9 +8,9 @@ from ..frontier.words import (
     counted_of,
     elements_of,
     folds_of,
-    luck_of,
     of_time,
     rates_of,
+    remarks_on_rates,
     summary,
     trainer_of,
     way_of,
@@ -72,7 +72,7 @@ def notes(frontier: Frontier, built: int | None) -> Iterator[str]:
         f"{counted(frontier.trials, 'trial')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
         f"{taxels}{counted(frontier.n_joints, 'joint')}; times on {frontier.machine}. "
-        f"{folds_of(frontier)}, placement inside the fold, with 95{NBSP}% intervals. {luck_of(frontier)}"
+        f"{folds_of(frontier)}, placement inside the fold, with 95{NBSP}% intervals. {remarks_on_rates(frontier)}"
     )
     if frontier.wanted and frontier.picked is not None:
         yield f"Point {frontier.picked} was picked for {frontier.wanted}."

@@ -112,7 +112,7 @@ typedef struct {
     const thenar_line *lines;
     const thenar_grid *grids;
     const uint16_t *thresholds;
-    const int8_t *means;            /* [switches + joints][1 + classes]: a shift, and what a missing input adds to open,
+    const int8_t *means;            /* [switches + joints][1 + classes]: a shift, then what a missing input adds to open
                                        or to code 0, shifted right by it */
     const char *names;              /* each with its end */
     const thenar_rejection *rejection;

@@ -65,6 +65,13 @@ class SegmentModel(Struct, frozen=True, forbid_unknown_fields=True, omit_default
                 f"a segment model enters {n_types} types, and leaves {held[0]}, directly {held[1]}; "
                 f"its durations are of {held[2]} types and none"
             )
+        costs = (*self.stay, *self.enter, *self.leave, *self.direct, self.refusal or 0)
+        if min(costs) < 0 or not 1 <= min(self.least) <= max(self.least) <= 255:
+            raise BuildError("a segment model has a cost below 0, or a shortest duration that is not 1 to 255 ticks")
+        if not (0 <= self.shift <= 8 and 1 <= self.gain <= 65535 and 1 <= self.most <= _MOST):
+            raise BuildError(
+                f"a frame cannot cost (difference >> {self.shift}) * {self.gain} >> 8, at most {self.most}"
+            )
         if self.shift < 8 and 255 * self.gain >> 8 < self.most:
             raise BuildError(
                 f"a gain of {self.gain} takes a byte to {255 * self.gain >> 8}, below {self.most}, "

@@ -492,7 +492,8 @@ def test_every_build_of_the_project_can_be_looked_at(
         assert [reply["types"][one] for one in reply["read"]] == [build.classify(*row) for row in rows]
     browser.click("all-errors")
     cards(browser, min(len(misread(reply)), 24))
-    assert said(browser, "#trials article li")
+    # Joints are marked, too, whose places nobody knows.
+    assert 0 < len(said(browser, "#trials article li")) == len(said(browser, "#trials .decisive title"))
     assert browser.axe() == []
     # What the build recognised before cannot be edited once other recordings are in use, which it cannot read.
     replace(people, switches=people.switches[:, :1], switch_names=people.switch_names[:1]).save(folder / "set.grasps")

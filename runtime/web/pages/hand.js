@@ -212,7 +212,7 @@ function chain(bone, lengths, bends) {
 }
 
 function posedHand(joints) {
-  // Points are no style, as a path is: that they change costs less.
+  // A path is a style and points are not, so it costs less to change points.
   const [forearm, palm] = [draw("polyline", { class: "flesh" }), draw("polygon", { class: "flesh" })];
   const digits = Object.entries(DIGITS).map(([digit, { width }]) => {
     const parts = [

@@ -231,7 +231,7 @@ export class Timeline {
     if (this.canvas.style.height !== `${high}px`) this.canvas.style.height = `${high}px`;
     if (!wide) return;
     this.#wide = wide;
-    // Of each colour the page's style has one for light pages and one for dark ones.
+    // The page's style has each colour twice: for light and for dark pages.
     const css = getComputedStyle(document.body), colour = (name) => css.getPropertyValue(`--${name}`).match(/#\w+/g)[DARK.matches ? 1 : 0];
     this.#colours = Object.fromEntries(["text", "soft", "page", "line", "warn", "bad"].map((name) => [name, colour(name)]));
     // A new size clears it.

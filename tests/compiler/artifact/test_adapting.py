@@ -198,3 +198,19 @@ def test_evaluate_finds_what_compile_states(tmp_path: Path) -> None:
     stated = next(rate for rate in rates if rate.of == "new subject after adaptation")
     row = study_wearers(crowd, recipe, (2,), 1).rows[0]
     assert sum(row.people) == pytest.approx(5 * stated.rate)
+
+
+@pytest.mark.parametrize("width", [4, 16])
+def test_evaluate_counts_the_tables_that_adapt_deploys(tmp_path: Path, width: int) -> None:
+    """With one other person no strength is chosen; frames that are refused count by their scores."""
+    crowd = recorded(2, 60, seed=9, frames=1)
+    recipe = changed(Recipe(inputs="joints", width=width), {"trainer": "logit", **SETTINGS["logit"]})
+    study = study_wearers(crowd, recipe, (2,), 1).rows[0]
+    for person, found in zip(("P0", "P1"), study.people, strict=True):
+        mine = crowd.rows(crowd.subjects == person)
+        compile_build(crowd.rows(crowd.subjects != person), tmp_path / f"of-{person}", recipe, jobs=1)
+        adapt(tmp_path / f"of-{person}", mine.rows(mine.trials < 8), output=tmp_path / person)
+        build, later = Build.load(tmp_path / person), mine.rows(mine.trials >= 8)
+        bits, codes = select_inputs(later, build.manifest)
+        predicted = np.array(build.grasps)[build.tables.scores(bits, codes).argmax(axis=1)]
+        assert found == np.mean(predicted == later.grasps)

@@ -289,6 +289,13 @@ def test_tables_beyond_16_bits_are_refused() -> None:
         Layout(make_tables(switches=0, joints=0))
 
 
+def test_means_that_bytes_do_not_hold_are_refused() -> None:
+    tables = make_tables(switches=3, joints=0)
+    finer = tables.changed(switch_means=np.full((3, 5), 1001, np.int16), switch_rows=np.full((3, 5), 2000, np.int16))
+    with pytest.raises(FirmwareError, match="finer than firmware stores: compile the build again"):
+        _ = Library("hand", numbered(finer), Layout(finer)).files
+
+
 def test_the_same_frame_costs_the_same_whatever_the_results_were(avr: None) -> None:
     tables = make_tables(switches=9, joints=2)
     layout, frames = Layout(tables), Probes(np.ones((3, 9), bool), np.full((3, 2), 7, np.uint16))

@@ -1,5 +1,6 @@
 """The whole of a frontier, over small sets: what every one must satisfy, sets with little in them, and going on."""
 
+import csv
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -184,20 +185,21 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
 def test_points_after_own_trials_are_those_that_evaluate_finds(tmp_path: Path) -> None:
     grasp_set = make_set(subjects=3)
     given = {"penalty": 1.0, "smoothness": 1.0}
-    request = asked(tmp_path, grasp_set, own=2, trainer="linear", settings=given)
+    request = asked(tmp_path, grasp_set, own_trials=2, trainer="linear", settings=given)
     found = found_of(request)
     assert found.points
-    for point in found.points:
+    table = [*csv.DictReader((tmp_path / "out" / "frontier.csv").read_text().splitlines())]
+    for point, row in zip(found.points, table, strict=True):
         options = picked(tmp_path / "out" / "frontier.json", point.number, grasp_set).options
         rows = study_wearers(grasp_set, changed(Recipe(), options), (0, 2), 1).rows
         assert point.adapted is not None
         # All of the three have as many trials.
-        for rate, row in zip(point.adapted, rows, strict=True):
-            assert rate.mean == pytest.approx(fmean(row.people))
+        for name, rate, study in zip(("before_adaptation", "after_adaptation"), point.adapted, rows, strict=True):
+            assert rate.mean == pytest.approx(fmean(study.people)) == float(row[name])
             assert (rate.over, rate.total) == (3, 96 - 3 * 4 * 2)
     refusals: dict[str, dict[str, object]] = {
         "record two or more subjects": {"grasp_set": make_set()},
-        "nobody has more than 8 trials of a type": {"own": 8},
+        "nobody has more than 8 trials of a type": {"own_trials": 8},
     }
     for reason, wrong in refusals.items():
         with pytest.raises(FrontierError, match=reason):
@@ -248,7 +250,7 @@ def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: 
 def test_progress_grows_to_its_end(tmp_path: Path) -> None:
     told = list[tuple[int, int]]()
     grasp_set = make_set(rows=400, subjects=3)
-    found_of(asked(tmp_path, grasp_set, own=1, report=lambda done, total: told.append((done, total))))
+    found_of(asked(tmp_path, grasp_set, own_trials=1, report=lambda done, total: told.append((done, total))))
     assert len({total for _, total in told}) == 1
     assert told == sorted(told)
     assert told[-1][0] == told[-1][1]

@@ -20,6 +20,9 @@ _USUAL = SegmentModel.usual(3, True, 100.0)
         ({"enter": (1, 2)}, "enters 2 types, and leaves 3"),
         ({"least": (1, 2, 3)}, "durations are of 2 types"),
         ({"enter": (), "leave": (), "direct": (), "least": (1,), "stay": (0,)}, "enters 0 types"),
+        ({"stay": (0, -1, 0, 0)}, "a cost below 0"),
+        ({"least": (0, 1, 1, 1)}, "not 1 to 255 ticks"),
+        ({"shift": 9}, "a frame cannot cost"),
         ({"shift": 3, "gain": 20}, "takes a byte to 19, below 48"),
         ({"least": (200, 1, 1, 1), "stay": (0, 99, 0, 0)}, "paths through this segment model may differ by 5"),
     ],
@@ -27,12 +30,6 @@ _USUAL = SegmentModel.usual(3, True, 100.0)
 def test_costs_that_do_not_fit_are_refused(changed: dict[str, object], reason: str) -> None:
     with pytest.raises(BuildError, match=reason):
         msgspec.structs.replace(_USUAL, **changed)
-
-
-@pytest.mark.parametrize("changed", [{"stay": (0, -1, 0, 0)}, {"least": (0, 1, 1, 1)}, {"shift": 9}, {"most": 255}])
-def test_costs_out_of_their_ranges_are_not_read(changed: dict[str, object]) -> None:
-    with pytest.raises(msgspec.ValidationError, match=next(iter(changed))):
-        msgspec.convert(msgspec.structs.asdict(_USUAL) | changed, SegmentModel)
 
 
 @given(st.floats(0.05, 30000), st.floats(0.02, 2))
